@@ -321,6 +321,10 @@ void pw_run_set_reference_level (pw_run *r);
 
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_error *error);
+/* Restarts the method if a discontinuity of a signal has been reached. */
+int pw_run_settle (pw_run *r, pw_error *error);
+/* Stores the sample at t as a row of pw_run_record (bindings.c). */
+int pw_record_row (pw_run *r, double t, double *row, pw_error *error);
 
 /* Advice where wheels lock, that is where the equation of a row contradicts others; "" if the row is not of a wheel. */
 static inline const char *pw_advice_on_wheel (const pw_system *s, int row) {

@@ -103,10 +103,10 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error);
 /* Advances each run by one or several steps.  With `code`, steps of fixed size are made at once, one run in each of its
  * lanes, unless half of the lanes or more would be empty or there are more runs than lanes; otherwise, or with NULL,
  * one run after the other.  memory: pw_specialised_lanes_memory.  The runs' systems have the structure of the code's.
- * Results are those of pw_run_advance_towards, bit for bit, and do not depend on the other runs.  status, error: of
- * each run. */
-void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
-                      int *status, pw_error *error);
+ * Results are those of pw_run_advance_towards, bit for bit, and do not depend on the other runs.  t_end, status, error:
+ * of each run. */
+void pw_runs_advance (pw_run *const *runs, int count, const double *t_end, const pw_specialised_lanes *code,
+                      void *memory, int *status, pw_error *error);
 
 /* Steps until t is reached or lies inside the last step, where pw_run_sample can evaluate it, or t_end is reached.
  * Returns as pw_run_advance. */
@@ -158,6 +158,35 @@ const char *pw_run_energy_advice (const pw_run *r, double defect);
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
 void pw_run_close (pw_run *r);
+
+/* ---- Inputs: signals whose values the caller sets between steps, as a controller does ---- */
+
+/* Gives a harmonic signal (PW_HARMONIC; one of amplitude 0 is a value that waits to be set) this constant value, in
+ * this run, from the time reached on; it acts from the next step.  signal: pw_system_find_signal.  A signal of a
+ * constraint calls pw_run_restart, since velocities may jump.  Saved states contain these values.  Errors: PW_INPUT if
+ * the signal has another type or the value is not finite; those of pw_run_restart, after which the signal is what it
+ * was. */
+int pw_run_set_input (pw_run *r, int signal, double value, pw_error *error);
+
+/* Runs that a caller steps together; all arrays are the caller's.  A run whose status is not PW_OK stays where it is
+ * until the caller sets its status and its error to 0. */
+typedef struct {
+  pw_run *const *run;                /* count */
+  int count, threads;                /* threads: how many share the runs */
+  int inputs, columns;               /* of each run: signals that are set, numbers that are observed */
+  const int *signal;                 /* inputs: numbers of signals (pw_run_set_input) */
+  const double *input;               /* count x inputs: their values */
+  const int *column;                 /* columns: numbers of a row of pw_run_record */
+  double *observed;                  /* count x columns */
+  int *status;                       /* count */
+  pw_error *error;                   /* count */
+  const pw_specialised_lanes *lanes; /* as in pw_runs_advance; or NULL */
+} pw_ensemble;
+
+/* Sets the inputs, then advances each run by dt >= 0 [s], to the same state as one run alone. */
+void pw_ensemble_step (const pw_ensemble *e, double dt);
+/* Stores the observed numbers at the time that each run has reached; NaN if its status is not PW_OK. */
+void pw_ensemble_observe (const pw_ensemble *e);
 
 /* ---- Checkpoints ---- */
 
@@ -226,11 +255,10 @@ int pw_system_record_width (const pw_system *s, int ledger); /* of runs with pw_
 /* Name and unit of a number of a row, as in tables; those of accelerations: the velocity's name and "'". */
 char *pw_system_record_name (const pw_system *s, int i, char *buffer, size_t size);
 const char *pw_system_record_unit (const pw_system *s, int i);
+/* 1 if rows of both have the same numbers: those of these names. */
+int pw_system_record_same (const pw_system *a, const pw_system *b, int ledger);
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,
                    pw_error *error);
-
-/* pw_function.eval of a signal whose value is the double at `context`; after changing it call pw_run_restart. */
-int pw_input_signal (void *context, double t, const double *x, double value[3], double *gradient);
 
 /* PW_VERSION of the library, which may differ from that of the header. */
 extern const char pw_version[];

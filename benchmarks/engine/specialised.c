@@ -186,8 +186,10 @@ static long lanes_run (void *context, long n) {
     const double end = d->run[0]->t + (double)count * d->step;
     while (pw_run_time (d->run[0]) < end) {
       int status[LANES_MOST];
+      double t_end[LANES_MOST];
       pw_error error[LANES_MOST] = { { 0 } };
-      pw_runs_advance (d->run, d->n, end, pw_scene_code_lanes (d->lanes), d->memory, status, error);
+      for (int k = 0; k < d->n; k++) t_end[k] = end;
+      pw_runs_advance (d->run, d->n, t_end, pw_scene_code_lanes (d->lanes), d->memory, status, error);
       for (int k = 0; k < d->n; k++)
         if (status[k] != PW_OK) engine_die (d->system->model, error[k].text);
     }

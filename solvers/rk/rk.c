@@ -953,18 +953,19 @@ static int several_possible (const pw_run *r) {
          !(r->watchdog.saddle && r->watchdog.singular_ahead) && r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
-/* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
- * pw_step_end; up to the first that reaches t; up to the next look at coordinates that are too large
- * (run.c).  Each must be twice as long as a step that counts as stalled (run.c). */
+/* The number of whole steps that can be taken at once: up to t_end, which may be the end of the last one, and the next
+ * breakpoint, with the tolerance of pw_step_end; up to the first that reaches t; up to the next look at coordinates
+ * that are too large (run.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const pw_method_data *d = r->data;
-  const double h = r->settings.step, stop = fmin (fmin (t_end, r->breakpoint), r->resolved_until) - PW_STEP_LONGER * h,
+  const double h = r->settings.step, longer = PW_STEP_LONGER * h,
+               last = fmin (r->breakpoint, r->resolved_until) - longer, stop = fmin (t_end - longer, last),
                shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
   while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->checked_span) {
     double next = d->counter.base + (double)(d->counter.count + n + 1) * h;
-    if (!(next <= stop && h > shortest * fabs (next))) break;
+    if (!(next <= stop || (next == t_end && next <= last)) || !(h > shortest * fabs (next))) break;
     reached = next, n++;
   }
   return n;
@@ -1007,12 +1008,12 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
 }
 
-/* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken
- * at once. */
-static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
+/* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than `least` can be
+ * taken at once. */
+static int several_plan (pw_run *r, double t, double t_end, int least, pw_scene_steps *x) {
   pw_method_data *d = r->data;
   int count = several_possible (r) ? several_count (r, t, t_end) : 0;
-  if (count < 2) return 0;
+  if (count < least) return 0;
   *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
   x->stages = d->tableau->stages, x->row = d->row, x->c = d->tableau->c;
   x->h = r->settings.step, x->base = d->counter.base, x->number = d->counter.count;
@@ -1043,7 +1044,7 @@ static int several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) 
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) {
   pw_scene_steps x;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  if (!pw_specialised_suits (r) || several_plan (r, t, t_end, &x) == 0) return pw_run_advance (r, t_end, error);
+  if (!pw_specialised_suits (r) || several_plan (r, t, t_end, 2, &x) == 0) return pw_run_advance (r, t_end, error);
   r->stopped = 0;
   if (pw_run_stop_requested (r)) return PW_STOPPED;
   r->specialised->steps (r->scene, &x);
@@ -1064,11 +1065,11 @@ static void several_add (several_lanes *x, int i, double t_end) {
   if (first && (r->method != first->method || r->stabilisation != first->stabilisation ||
                 r->settings.step != first->settings.step))
     return;
-  if (several_plan (x->run[i], t_end, t_end, &x->steps[x->used]) > 0) x->index[x->used++] = i;
+  if (several_plan (x->run[i], t_end, t_end, 1, &x->steps[x->used]) > 0) x->index[x->used++] = i;
 }
 
-void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
-                      int *status, pw_error *error) {
+void pw_runs_advance (pw_run *const *runs, int count, const double *t_end, const pw_specialised_lanes *code,
+                      void *memory, int *status, pw_error *error) {
   several_lanes x = { .run = runs };
   int done[PW_LANES_MOST] = { 0 };
   for (int i = 0; i < count && code && count <= code->lanes; i++) {
@@ -1077,7 +1078,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     if (pw_run_stop_requested (runs[i]))
       status[i] = PW_STOPPED, done[i] = 1;
     else
-      several_add (&x, i, t_end);
+      several_add (&x, i, t_end[i]);
   }
   if (x.used > 0 && 2 * x.used > code->lanes) { /* with half of them empty, one run after the other is faster */
     pw_scene_steps *steps[PW_LANES_MOST];
@@ -1095,7 +1096,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
   }
   for (int i = 0; i < count; i++)
     if (i >= PW_LANES_MOST || !done[i])
-      status[i] = pw_run_advance_towards (runs[i], t_end, t_end, error ? &error[i] : NULL);
+      status[i] = pw_run_advance_towards (runs[i], t_end[i], t_end[i], error ? &error[i] : NULL);
 }
 
 int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {

@@ -33,6 +33,20 @@ char *pw_system_record_name (const pw_system *s, int i, char *buffer, size_t siz
   return pw_system_ledger_name (s, i - s->outputs, buffer, size);
 }
 
+/* Names of columns follow from those of bodies, elements and outputs. */
+int pw_system_record_same (const pw_system *a, const pw_system *b, int ledger) {
+  int same = a->bodies == b->bodies && a->batches == b->batches && a->outputs == b->outputs &&
+             pw_system_record_width (a, ledger) == pw_system_record_width (b, ledger);
+  for (int i = 0; same && i < a->bodies; i++) same = strcmp (a->body_name[i], b->body_name[i]) == 0;
+  for (int k = 0; same && k < a->batches; k++) {
+    const pw_element_batch *x = &a->batch[k], *y = &b->batch[k];
+    same = x->kind == y->kind && x->b.count == y->b.count;
+    for (int e = 0; same && e < x->b.count; e++) same = strcmp (x->name[e], y->name[e]) == 0;
+  }
+  for (int i = 0; same && i < a->outputs; i++) same = strcmp (a->output[i].name, b->output[i].name) == 0;
+  return same;
+}
+
 const char *pw_system_record_unit (const pw_system *s, int i) {
   const int n = s->coords, contacts = 2 * pw_system_contacts (s);
   if (i < PW_RECORD_STATES) return i == 0 ? "s" : i < 3 ? "" : "J";
@@ -54,15 +68,13 @@ static double *record_contacts (const pw_run *r, double *to) {
   return to;
 }
 
-/* Stores a sample in the next row. */
-static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_error *error) {
+int pw_record_row (pw_run *r, double t, double *row, pw_error *error) {
   const size_t n = (size_t)r->s->coords;
   pw_sample x;
   int status = pw_run_sample (r, t, &x, error);
   if (status != PW_OK) return status;
   const double before_states[PW_RECORD_STATES] = { x.t,    x.position, x.velocity,   x.kinetic, x.potential,
                                                    x.work, x.loss,     x.projection, x.balance };
-  double *row = rows + (*recorded)++ * pw_run_record_width (r);
   memcpy (row, before_states, sizeof before_states);
   row += PW_RECORD_STATES;
   memcpy (row, x.q, n * sizeof *row);
@@ -74,6 +86,13 @@ static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_
   if (r->s->outputs) memcpy (row, x.output, (size_t)r->s->outputs * sizeof *row);
   if (x.ledger) memcpy (row + r->s->outputs, x.ledger, (size_t)r->s->entries * sizeof *row);
   return PW_OK;
+}
+
+/* Stores a sample in the next row. */
+static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_error *error) {
+  int status = pw_record_row (r, t, rows + *recorded * pw_run_record_width (r), error);
+  *recorded += status == PW_OK;
+  return status;
 }
 
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,
@@ -92,12 +111,6 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
     if (status == PW_OK && times == NULL) status = record_sample (r, r->t, rows, recorded, error);
   }
   return status;
-}
-
-int pw_input_signal (void *context, double t, const double *x, double value[3], double *gradient) {
-  (void)t, (void)x, (void)gradient;
-  value[0] = *(const double *)context, value[1] = value[2] = 0;
-  return 0;
 }
 
 /* ---- Version and layouts ---- */
@@ -121,11 +134,17 @@ const pw_member pw_members[] = {
   SIZE (pw_settings),
   AT4 (pw_settings, t, span, step, rtol),
   AT4 (pw_settings, atol, ledger, max_steps, initial),
-  AT2 (pw_settings, initials, specialised),
+  AT4 (pw_settings, initials, specialised, stop, stop_context),
   SIZE (pw_statistics),
   AT4 (pw_statistics, steps, rejected, rhs, jacobians),
-  AT4 (pw_statistics, factorisations, specialised, position, velocity),
-  AT2 (pw_statistics, g, jv),
+  AT4 (pw_statistics, factorisations, restarts, specialised, position),
+  AT4 (pw_statistics, unresolved, velocity, g, jv),
+  SIZE (pw_archive),
+  AT4 (pw_archive, at, used, size, loading),
+  SIZE (pw_ensemble),
+  AT4 (pw_ensemble, run, count, threads, inputs),
+  AT4 (pw_ensemble, columns, signal, input, column),
+  AT4 (pw_ensemble, observed, status, error, lanes),
   SIZE (pw_event),
   AT4 (pw_event, t, impulse, row, from),
   AT2 (pw_event, to, impact),
@@ -133,6 +152,7 @@ const pw_member pw_members[] = {
   AT2 (pw_crossing, value, context),
   SIZE (pw_initial_report),
   AT4 (pw_initial_report, q_given, v_given, q, v),
+  AT2 (pw_initial_report, moved, released),
   SIZE (pw_parameter),
   AT4 (pw_parameter, name, value, unit, about),
   SIZE (pw_field),
@@ -150,6 +170,7 @@ const pw_member pw_members[] = {
   AT2 (pw_plugin_table, run.rtol, run.method),
   SIZE (pw_signal),
   AT4 (pw_signal, type, function.eval, function.context, function.reads),
+  AT (pw_signal, harmonic.offset),
   SIZE (pw_linear),
   AT4 (pw_linear, positions, velocities, unknowns, A),
   AT4 (pw_linear, re, im, steady, twist),

@@ -118,6 +118,14 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
+int pw_run_settle (pw_run *r, pw_error *error) {
+  if (!r->interrupted) return PW_OK;
+  if (run_has_no_method (r, error)) return PW_RESOURCE;
+  const int status = run_restart_method (r, error);
+  if (status == PW_OK) r->interrupted = 0;
+  return status;
+}
+
 /* If the active rows have become nearly dependent, looks for another set that is not, with which the method is
  * reopened.  This is done only before the next step or in a restart, since until then the last step may be sampled. */
 static int run_reselect (pw_run *r, pw_error *error) {
@@ -171,8 +179,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   pw_forget_residuals (r);
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   r->interrupted |= r->t >= r->breakpoint;
-  if (r->interrupted) status = run_restart_method (r, error);
-  if (status == PW_OK) r->interrupted = 0;
+  status = pw_run_settle (r, error);
   if (status == PW_OK) status = run_reselect (r, error);
   const double stop = t_end < r->breakpoint ? t_end : r->breakpoint;
   if (status == PW_OK && run_is_at (r, stop)) {
@@ -323,6 +330,26 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   r->reselect_below = reselect_below, r->initial = initial;
   if (run_select_rows (r, NULL) == PW_OK && pw_run_evaluate (r, NULL) == PW_OK && r->redundant) pw_watchdog_begin (r);
   r->interrupted |= r->redundant > 0; /* run_select_rows may have opened the method at the refused state */
+  return status;
+}
+
+/* A force changes accelerations alone, so that the method is restarted before the next step, as at a breakpoint. */
+int pw_run_set_input (pw_run *r, int signal, double value, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
+  pw_source *x = signal >= 0 && signal < r->s->sources ? &r->w->source[signal] : NULL;
+  if (x == NULL || x->signal.type != PW_HARMONIC)
+    return pw_fail (error, PW_INPUT, "model %s: %s: expected a harmonic signal, whose place the value takes",
+                    r->s->model, x ? PW_NAME (pw_system_signal_name, r->s, signal) : "an input that does not exist");
+  if (!(fabs (value) < r->thresholds.extreme))
+    return pw_fail (error, PW_INPUT, "model %s: input %s = %g: expected a magnitude below %g", r->s->model,
+                    PW_NAME (pw_system_signal_name, r->s, signal), value, r->thresholds.extreme);
+  const pw_harmonic before = x->signal.harmonic;
+  if (before.amplitude == 0 && before.offset == value) return PW_OK;
+  x->signal.harmonic = (pw_harmonic){ .offset = value };
+  r->w->t_signal = NAN;
+  r->interrupted |= x->of_force;
+  const int status = x->of_force ? PW_OK : pw_run_restart (r, NULL, NULL, error);
+  if (status != PW_OK) x->signal.harmonic = before, r->w->t_signal = NAN;
   return status;
 }
 

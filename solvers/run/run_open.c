@@ -356,6 +356,10 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, r->q, n);
   pw_archive_bytes (a, r->v, n);
   pw_archive_bytes (a, r->ledger, entries);
+  for (int i = 0; i < r->s->sources; i++) /* values of inputs */
+    if (r->s->source[i].signal.type == PW_HARMONIC)
+      pw_archive_bytes (a, &r->w->source[i].signal.harmonic, sizeof (pw_harmonic));
+  if (a->loading) r->w->t_signal = NAN;
   checkpoint_statistics (&r->statistics, a);
   pw_rank_serialise (r, a);
   pw_events_serialise (r, a);
@@ -377,7 +381,9 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   pw_sample sample;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   if (r->near_singular) return PW_RETRY;
-  int status = pw_run_sample (r, r->t, &sample, error); /* some methods evaluate the state reached only here */
+  int status = pw_run_settle (r, error);
+  if (status == PW_OK)
+    status = pw_run_sample (r, r->t, &sample, error); /* some methods evaluate the state reached only here */
   if (status != PW_OK) return status;
   checkpoint_same (r, a);
   checkpoint_state (r, a);

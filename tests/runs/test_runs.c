@@ -241,7 +241,7 @@ TEST (missing) {
   for (int i = 1; i < 5; i++) check_error (&e[i], PW_INPUT, "a run is missing");
   pw_run *none[] = { NULL, NULL };
   int status[] = { PW_OK, PW_OK };
-  pw_runs_advance (none, 2, 1, NULL, NULL, status, NULL);
+  pw_runs_advance (none, 2, (double[]){ 1, 1 }, NULL, NULL, status, NULL);
   assert_true (status[0] == PW_INPUT && status[1] == PW_INPUT);
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);

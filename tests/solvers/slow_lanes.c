@@ -38,12 +38,13 @@ static void several_close (several *x) {
 /* Advances all runs together, each until it ends. */
 static void several_advance (several *x, double t, const pw_specialised_lanes *code, void *memory) {
   pw_run *run[MOST];
+  double t_end[MOST];
   int which[MOST], status[MOST];
-  for (int k = 0; k < x->n; k++) which[k] = k;
+  for (int k = 0; k < x->n; k++) which[k] = k, t_end[k] = t;
   for (int left = x->n, keep; left > 0; left = keep) {
     pw_error error[MOST] = { { 0 } };
     for (int i = 0; i < left; i++) run[i] = x->run[which[i]];
-    pw_runs_advance (run, left, t, code, memory, status, error);
+    pw_runs_advance (run, left, t_end, code, memory, status, error);
     for (int i = keep = 0; i < left; i++) {
       int k = which[i];
       x->status[k] = status[i], x->error[k] = error[i];

@@ -61,8 +61,10 @@ static void several_compare (const several *x, double t, double before) {
   for (int k = 0; k < x->n; k++) check_ok (pw_run_advance_to (x->alone[k], t, t, NULL), NULL);
   while (pw_run_time (x->together[0]) < t) {
     int status[MOST];
+    double t_end[MOST];
     pw_error error[MOST] = { { 0 } };
-    pw_runs_advance (x->together, x->n, t, &code, memory, status, error);
+    for (int k = 0; k < x->n; k++) t_end[k] = t;
+    pw_runs_advance (x->together, x->n, t_end, &code, memory, status, error);
     for (int k = 0; k < x->n; k++) check_ok (status[k], &error[k]);
   }
   for (int k = 0; k < x->n; k++) {
@@ -146,7 +148,7 @@ TEST (waiting) {
     check_ok (pw_run_advance_to (x.together[k], 0.1 + 0.01 * k, 0.1 + 0.01 * k, NULL), NULL);
   int status[MOST];
   pw_error error[MOST] = { { 0 } };
-  pw_runs_advance (x.together, x.n, 1, pw_scene_code_lanes (x.lanes), memory, status, error);
+  pw_runs_advance (x.together, x.n, (double[]){ 1, 1, 1, 1 }, pw_scene_code_lanes (x.lanes), memory, status, error);
   for (int k = 0; k < x.n; k++) {
     const pw_run *r = x.together[k];
     check_ok (status[k], &error[k]);

@@ -316,13 +316,14 @@ static void worker_advance (sweep_worker *worker) {
   const pw_plan *plan = worker->sweep->plan;
   sweep_row *running[PW_LANES_MOST];
   pw_run *run[PW_LANES_MOST];
+  double t_end[PW_LANES_MOST];
   int status[PW_LANES_MOST], n = 0, same_code = 1, ended = 0;
   pw_error error[PW_LANES_MOST];
   for (sweep_row *row = worker->row; row < worker->row + worker->width; row++) {
     if (row->system == NULL) continue;
     if (row_ended (row, plan)) return; /* it could not be opened, and is stored first */
     same_code &= row->system->code == pw_scene_code_table (plan->engine.code);
-    running[n] = row, error[n] = (pw_error){ 0 }, run[n++] = row->run;
+    running[n] = row, error[n] = (pw_error){ 0 }, t_end[n] = plan->settings.span, run[n++] = row->run;
   }
   if (plan->by_steps) /* one run */
     while (!row_ended (running[0], plan))
@@ -330,8 +331,7 @@ static void worker_advance (sweep_worker *worker) {
           pw_outcomes_advance (&running[0]->of, run[0], plan->settings.span, plan->settings.span, &running[0]->error);
   if (plan->by_steps) return;
   while (!ended) {
-    pw_runs_advance (run, n, plan->settings.span, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status,
-                     error);
+    pw_runs_advance (run, n, t_end, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status, error);
     for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->settings.span);
   }
   for (int i = 0; i < n; i++) running[i]->status = status[i], running[i]->error = error[i];

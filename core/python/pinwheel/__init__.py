@@ -13,13 +13,14 @@ from . import elements
 from ._library import VERSION as __version__
 from ._library import Error, InitialError, InputError, MethodError, ResourceError
 from .elements import Body, Element
-from .model import Linear, Model, describe, models, sweep
+from .model import Feedback, Linear, Model, describe, models, sweep
 from .results import Result
 from .simulation import Inputs, Simulation
 from .studies import command, help_of
+from .vector import VectorSimulation
 
-__all__ = ["Body", "Element", "Error", "InitialError", "InputError", "Inputs", "Linear", "MethodError", "Model",
-           "ResourceError", "Result", "Simulation", "command", "describe", "elements", "help_of", "models", "sweep",
+__all__ = ["Body", "Element", "Error", "Feedback", "InitialError", "InputError", "Inputs", "Linear", "MethodError", "Model",
+           "ResourceError", "Result", "Simulation", "VectorSimulation", "command", "describe", "elements", "help_of", "models", "sweep",
            "__version__"]
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ import numpy as np
 
 VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
-PW_FUNCTION, PW_STEADY, PW_SPECIALISE_STEPS = 2, 0, 1000000
+PW_HARMONIC, PW_FUNCTION, PW_STEADY, PW_SPECIALISE_STEPS, PW_RECORD_STATES = 1, 2, 0, 1000000, 9
 PW_FORCE, PW_HOLONOMIC, PW_NONHOLONOMIC = range(3)
 PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE, PW_TEXT = range(7)
 DOMAINS = {"PW_REAL": "", "PW_NONNEGATIVE": ">= 0", "PW_POSITIVE": "> 0", "PW_COUNT": "1, 2, 3, ...",
@@ -155,13 +155,15 @@ pw_error = _structure("pw_error", status=c.c_int, text=c.c_char * 500)
 pw_initial_value = _structure("pw_initial_value", state=c.c_int, value=c.c_double)
 pw_settings = _structure(
     "pw_settings", t=c.c_double, span=c.c_double, step=c.c_double, rtol=c.c_double, atol=c.c_double, ledger=c.c_int,
-    max_steps=c.c_long, initial=c.c_void_p, initials=c.c_int, specialised=c.c_void_p)
+    stop=c.c_void_p, stop_context=c.c_void_p, max_steps=c.c_long, initial=c.c_void_p, initials=c.c_int, specialised=c.c_void_p)
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
     restarts=c.c_long, specialised=c.c_long, unresolved=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
 pw_event = _structure("pw_event", t=c.c_double, impulse=c.c_double, row=c.c_int, to=c.c_int, impact=c.c_int, **{"from": c.c_int})
 pw_crossing = _structure("pw_crossing", value=c.c_void_p, context=c.c_void_p)
-pw_initial_report = _structure("pw_initial_report", q_given=_double_p, v_given=_double_p, q=_double_p, v=_double_p)
+pw_initial_report = _structure(
+    "pw_initial_report", q_given=_double_p, v_given=_double_p, q=_double_p, v=_double_p, moved=c.c_int,
+    released=c.c_int)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
 pw_field = _structure(
     "pw_field", name=c.c_char_p, type=c.c_int, count=c.c_int, unit=c.c_char_p, required=c.c_int, domain=c.c_int,
@@ -176,6 +178,11 @@ pw_plugin_table = _structure(
     run__rtol=c.c_double, run__method=c.c_char_p)
 pw_signal = _structure(
     "pw_signal", type=c.c_int, function__eval=c.c_void_p, function__context=c.c_void_p, function__reads=c.c_void_p)
+pw_constant = _structure("pw_signal", type=c.c_int, harmonic__offset=c.c_double)  # other members of its union
+pw_archive = _structure("pw_archive", at=c.c_void_p, used=c.c_size_t, size=c.c_size_t, loading=c.c_int)
+pw_ensemble = _structure(
+    "pw_ensemble", run=c.c_void_p, count=c.c_int, threads=c.c_int, inputs=c.c_int, columns=c.c_int, signal=c.c_void_p,
+    input=c.c_void_p, column=c.c_void_p, observed=c.c_void_p, status=c.c_void_p, error=c.c_void_p, lanes=c.c_void_p)
 pw_linear = _structure(
     "pw_linear", positions=c.c_int, velocities=c.c_int, unknowns=c.c_int, A=_double_p, re=_double_p, im=_double_p,
     steady=c.c_int, twist=c.c_double * 3, B=_double_p, basis=_double_p)
@@ -215,12 +222,19 @@ _declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_signal_
          ("pw_system_table_notice", _p, _i, _d, _s, _z),
          ("pw_system_state_unit", _p, _i), ("pw_system_signal_unit", _p, _i))
 _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p, _p, _p, _e),
-         ("pw_run_record_width", _p), ("pw_system_record_width", _p, _i), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
+         ("pw_run_record_width", _p), ("pw_system_record_width", _p, _i), ("pw_system_record_same", _p, _p, _i), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
 _declare(core, _p, ("pw_repetition_open", _p, _s, c.POINTER(pw_settings), _p, c.c_long, _e))
 _declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_error", _p, _p, c.c_long, _p, _p, _e))
 _declare(core, None, ("pw_repetition_close", _p))
 _declare(core, _d, ("pw_run_time", _p))
+_declare(core, _double_p, ("pw_system_mass", _p))
+_declare(core, _s, ("pw_system_body_name", _p, _i))
+_declare(core, None, ("pw_ensemble_step", _p, _d), ("pw_ensemble_observe", _p), ("pw_archive_free", c.POINTER(pw_archive)))
+_declare(core, _i, ("pw_run_save", _p, c.POINTER(pw_archive), _e), ("pw_run_load", _p, c.POINTER(pw_archive), _e),
+         ("pw_system_find_signal", _p, _s, _e), ("pw_system_has_lanes", _p))
+_declare(files, _p, ("pw_scene_lanes_open", _p, _p, _i, _e), ("pw_scene_code_lanes", _p))
+_declare(files, _i, ("pw_processor_lanes",))
 _declare(core, c.POINTER(pw_event), ("pw_run_events", _p, c.POINTER(_i)))
 _declare(core, _s, ("pw_system_mode_name", _p, _i, _i), ("pw_system_reaction_name", _p, _i, _s, _z))
 _declare(core, _i, ("pw_run_find_crossing", _p, c.POINTER(pw_crossing), _double_p, _e))
@@ -231,7 +245,7 @@ _declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_a
          ("pw_system_contacts", _p), ("pw_system_outputs", _p))
 _declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
-_declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),
+_declare(core, _i, ("pw_run_redundant", _p), ("pw_specialised_fits", _p, _p), ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),
          ("pw_initial_specified", c.POINTER(pw_initial_report), _i))
 _declare(core, c.POINTER(pw_statistics), ("pw_run_statistics", _p))
 

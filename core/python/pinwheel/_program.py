@@ -36,30 +36,38 @@ def run(arguments):
     return done
 
 
-def animation(result) -> str:
-    """An HTML frame that animates a run of the result's model and settings; a text with the reason if there is none."""
+def _animated(result):
+    """The arguments that repeat a run; InputError if the program cannot."""
     given = result.settings
     if result.model is None:
-        return html.escape(f"{result!r}, not shown: the copy of a result has no functions in Python")
+        raise lib.InputError("the copy of a result has no functions in Python")
     if "inputs" in given:
-        return html.escape(f"{result!r}, not shown: the program cannot set inputs")
-    settings = [f"--method={given['method']}", f"--t-end={given['t_end']!r}",
-                f"--specialise={given.get('specialise', 'auto')}"]
-    settings += [f"--{name}={given[name]!r}" for name in ("step", "rtol", "atol") if name in given]
-    return _page("run", result.model, "--animate", settings, repr(result))
+        raise lib.InputError("the program cannot set inputs")
+    return [*options(result.model), f"--method={given['method']}", f"--t-end={given['t_end']!r}",
+            f"--specialise={given.get('specialise', 'auto')}"] + [f"--{name}={given[name]!r}" for name in ("step", "rtol", "atol") if name in given]
+
+
+def write_animation(result, path) -> None:
+    """Writes the page that animates a run of the result's model and settings."""
+    run(["run", *_animated(result), f"--animate={path}"])
+
+
+def animation(result) -> str:
+    """An HTML frame that animates a run of the result's model and settings; a text with the reason if there is none."""
+    return _page(lambda path: write_animation(result, path), repr(result))
 
 
 def interactive(model) -> str:
     """An HTML frame with the page that simulates a model in the browser; a text with the reason if there is none."""
-    return _page("page", model, "--output", [], repr(model))
+    return _page(lambda path: run(["page", *options(model), f"--output={path}"]), repr(model))
 
 
-def _page(command, model, output_option, settings, otherwise):
-    """An HTML frame with the page that a command writes; if it fails, `otherwise` and the reason."""
+def _page(write, otherwise):
+    """An HTML frame with the page that a function writes to a path; if it fails, `otherwise` and the reason."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "page.html"
         try:
-            run([command, *options(model), f"{output_option}={path}", *settings])
+            write(path)
             page = path.read_text(encoding="utf-8")
         except (lib.Error, OSError) as failure:
             return html.escape(f"{otherwise}, not shown: {failure}")

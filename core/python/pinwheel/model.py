@@ -23,6 +23,7 @@ import numpy as np
 
 from . import _library as lib
 from . import _program, studies
+from .ensemble import columns
 from .results import Result, _nearest
 from .simulation import Simulation, specialised, warn_of_unused
 
@@ -30,15 +31,17 @@ from .simulation import Simulation, specialised, warn_of_unused
 class _System(lib.Handle):
     """A compiled system, which simulations share.
 
-    needed: C objects to which it refers; signals: functions and cells; in_python: whether there are functions in Python.
+    needed: C objects to which it refers; signals: functions; inputs: initial values of the signals that are set between
+    steps; in_python: whether there are functions in Python.
     """
 
     _compiling = threading.RLock()  # one specialised code at a time; a function of a signal may run other models
 
-    def __init__(self, pointer, needed, signals, in_python):
+    def __init__(self, pointer, needed, signals, inputs, in_python):
         super().__init__(pointer, lib.core.pw_system_free, *needed)
-        self._signals, self._in_python = signals, in_python
-        self._code = lib.Handle(None, lib.files.pw_scene_code_close)
+        self.model = needed[-1].pointer
+        self._signals, self.inputs, self.in_python = signals, inputs, in_python
+        self._code = self._lanes = lib.Handle(None, lib.files.pw_scene_code_close)
         self._code_tried, self.no_code = False, ""
 
     def code(self) -> int | None:
@@ -46,14 +49,28 @@ class _System(lib.Handle):
         with self._compiling:
             if not self._code_tried:
                 try:
-                    text, error = self._source(), lib.pw_error()
-                    self._code = lib.Handle(lib.files.pw_scene_code_open(text, self.pointer, c.byref(error)), lib.files.pw_scene_code_close)
-                    lib.free(text)
-                    lib.check(error)
+                    self._code = self._built(lib.files.pw_scene_code_open)
                 except lib.Error as failure:
                     self.no_code = str(failure)
                 self._code_tried = True
         return lib.files.pw_scene_code_table(self._code.pointer)
+
+    def lanes(self) -> int | None:
+        """Code that advances several runs at once; None if there cannot be any, or it would not be faster."""
+        count = lib.files.pw_processor_lanes()
+        with self._compiling:
+            if count > 1 and self.code() and self._lanes.pointer is None and lib.core.pw_system_has_lanes(self.pointer):
+                with contextlib.suppress(lib.Error):
+                    self._lanes = self._built(lib.files.pw_scene_lanes_open, count)
+        return lib.files.pw_scene_code_lanes(self._lanes.pointer)
+
+    def _built(self, function, *arguments):
+        """The code that a function of the library makes from the text."""
+        text, error = self._source(), lib.pw_error()
+        code = lib.Handle(function(text, self.pointer, *arguments, c.byref(error)), lib.files.pw_scene_code_close)
+        lib.free(text)
+        lib.check(error)
+        return code
 
     def _source(self):
         """The text of the code for the independent constraint equations, which a run selects."""
@@ -66,10 +83,14 @@ class _System(lib.Handle):
         finally:
             lib.core.pw_run_close(run)
 
+    def has_columns_of(self, other: _System, ledger) -> bool:
+        """Whether results of both have the same columns."""
+        return self is other or bool(lib.core.pw_system_record_same(self.pointer, other.pointer, bool(ledger)))
+
     def call(self, function, *arguments):
         """The result of a function of the library that evaluates the system, whose last argument is an error."""
         error, call = lib.pw_error(), lib.Call()
-        with call if self._in_python else contextlib.nullcontext():
+        with call if self.in_python else contextlib.nullcontext():
             result = function(*arguments, c.byref(error))
         try:
             call.check(error)
@@ -142,6 +163,57 @@ class Linear:
     twist: np.ndarray
 
 
+class Feedback:
+    """A signal that is a function of the time and of states: ``pw.Feedback(lambda t, x: -0.5 * x[0], ["steer.phi"])``.
+
+    It is called at every stage of every step; a signal of a text model that is an expression of the states is faster.
+
+    Parameters
+    ----------
+    function : callable
+        ``f(t, x)`` of the time [s] and the list of the states named in reads; returns a number.  Of a velocity constraint it
+        may return the value, its partial derivative by the time, and any third number; the derivative of a number is found by
+        differences.
+    reads : sequence of str
+        States: of velocity constraints positions and first-order states, of forces any.
+    gradient : callable, optional
+        ``g(t, x)`` returns the derivatives by x; by default, they are found by differences, with errors of about 1e-9.
+    """
+
+    def __init__(self, function: Callable, reads, gradient: Callable | None = None):
+        if not callable(function) or not (gradient is None or callable(gradient)):
+            raise lib.InputError(f"Feedback: expected functions of the time and the states, found {function!r:.60}")
+        self.reads = [reads] if isinstance(reads, str) else list(reads)
+        self.function, self.gradient = function, gradient
+
+    def __call__(self, t, x):
+        return self.function(t, x)
+
+    def _value(self, t, x, name):
+        """Acceleration, rate and value, the rate a partial derivative by the time."""
+        found = self.function(t, x)
+        if np.ndim(found):
+            return _numbers_of(found, name)
+        h = 6e-6 * max(1.0, abs(t))
+        return 0.0, (self._number(t + h, x, name) - self._number(t - h, x, name)) / (2 * h), _numbers_of(found, name)[2]
+
+    def _slopes(self, t, x, name):
+        """The derivatives by x."""
+        if self.gradient:
+            found = np.ravel(np.asarray(self.gradient(t, x), float)).tolist()
+            if len(found) != len(x):
+                raise lib.InputError(f"signal {name}: expected a gradient of {len(x)} numbers, found {len(found)}")
+            return found
+        found = []
+        for i, at in enumerate(x):
+            h = 6e-6 * max(1.0, abs(at))
+            found.append((self._number(t, [*x[:i], at + h, *x[i + 1:]], name) - self._number(t, [*x[:i], at - h, *x[i + 1:]], name)) / (2 * h))
+        return found
+
+    def _number(self, t, x, name):
+        return _numbers_of(self.function(t, x), name)[2]
+
+
 def models() -> dict:
     """Names of the models on the search path, and their files."""
     found, error = {}, lib.pw_error()
@@ -157,7 +229,7 @@ def models() -> dict:
     return found
 
 
-class Model:
+class Model(studies.Analyses):
     """A model with values of its parameters.
 
     Parameters
@@ -170,7 +242,7 @@ class Model:
     signals : dict, optional
         Functions of the time [s] that replace signals: ``{"rider": lambda t: 0.1 * math.cos(t)}``; of a constraint they
         return the value, its rate and its acceleration, which are compared at a few times, to 1 %.  The name is that of
-        the element, or ELEMENT.FIELD.
+        the element, or ELEMENT.FIELD.  Functions of states: :class:`Feedback`.
     **parameters : float or str
         Values of the model's parameters, in the units of :attr:`units`, or expressions such as ``"30*deg"``.
 
@@ -208,7 +280,11 @@ class Model:
         listed = list(lib.listed(lib.pw_parameter, table.parameters))
         self.parameters = {p.name.decode(): p.value for p in listed}
         self.units = {p.name.decode(): lib.text(p.unit) for p in listed}
-        self._given = {}
+        self._given: dict[str, float] = {}
+        self._set(parameters)
+
+    def _set(self, parameters):
+        """Sets parameters and compiles."""
         for name in self.start:
             if name in self.parameters:
                 raise lib.InputError(f"start: {name} is a parameter of model {self.name}, expected a state; pass {name}=VALUE")
@@ -218,7 +294,7 @@ class Model:
             if name not in self.parameters:
                 raise lib.InputError(f"model {self.name} has no parameter {name!r}{_nearest(name, self.parameters)}")
             self.parameters[name] = self._given[name] = lib.number(value, name)
-        self._compiled = None
+        self._compiled: dict[tuple, _System] = {}  # by inputs
         self._compile()  # refuses what is wrong
 
     def __repr__(self):
@@ -250,15 +326,23 @@ class Model:
         **parameters : float or str
             Values of parameters; the others stay.
         """
-        start = {**self.start, **lib.numbers(start or {}, "start")}
-        return Model(self._origin, start=start, signals=self.signals, **{**self._given, **parameters})
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.__dict__.pop("_columns", None)
+        other.start = {**self.start, **lib.numbers(start or {}, "start")}
+        other.parameters, other._given = dict(self.parameters), dict(self._given)
+        other._set(parameters)
+        return other
 
     # ---- Compiling ----
 
-    def _compile(self, inputs=None):
-        """The compiled system, and the cells (C doubles) that its inputs read, by name."""
-        if not inputs and self._compiled:
-            return self._compiled
+    def _compile(self, inputs=None) -> _System:
+        """The compiled system.  inputs: initial values of the signals that are set between steps, by name."""
+        inputs = lib.numbers(inputs or {}, "inputs")
+        if system := self._compiled.get(tuple(inputs.items())):
+            return system
+        if len(self._compiled) > 7:
+            self._compiled.clear()
         error, keep = lib.pw_error(), []
         model = lib.Handle(lib.files.pw_file_model(self._file.pointer, c.byref(error)), lib.core.pw_model_free)
         lib.check(error)
@@ -271,35 +355,75 @@ class Model:
             lib.core.pw_model_set_initial(model.pointer, state.encode(), value, c.byref(error))
         lib.check(error)
         for name, function in self.signals.items():
-            self._set_signal(model, name, _callback(name, function), None, keep)
-            if self.signals.checked.get(name) is not function:
+            feedback = function if isinstance(function, Feedback) else None
+            keep.append(_callback(name, function) if feedback is None else _feedback_callback(name, feedback))
+            signal = lib.pw_signal(type=lib.PW_FUNCTION, function__eval=c.cast(keep[-1], c.c_void_p).value)
+            if feedback:
+                keep.append((c.c_char_p * (len(feedback.reads) + 1))(*[lib.encode(name, "reads") for name in feedback.reads], None))
+                signal.function__reads = c.addressof(keep[-1])
+            self._set_signal(model, name, signal)
+            if feedback is None and self.signals.checked.get(name) is not function:
                 call, count = lib.Call(), _derivatives(model.pointer, name.partition(".")[0])
                 call.passing(_check_derivatives, name, function, count, self.defaults["t_end"], call)
                 self.signals.checked[name] = function
-        cells = {name: c.c_double(value) for name, value in lib.numbers(inputs or {}, "inputs").items()}
-        reads_cell = c.cast(lib.core.pw_input_signal, c.c_void_p).value
-        for name, cell in cells.items():
-            self._set_signal(model, name, reads_cell, c.addressof(cell), keep)
+        for name, value in inputs.items():
+            self._set_signal(model, name, lib.pw_constant(type=lib.PW_HARMONIC, harmonic__offset=value))
         pointer = lib.core.pw_system_compile(model.pointer, c.byref(error))
         lib.check(error)
-        system = _System(pointer, (self._file, model), (keep, cells), bool(self.signals))
-        if not inputs:
-            self._compiled = system, cells
-        return system, cells
+        in_python = any(name not in inputs for name in self.signals)
+        system = self._compiled[tuple(inputs.items())] = _System(pointer, (self._file, model), keep, inputs, in_python)
+        return system
 
-    def _set_signal(self, model, name, function, context, keep):
-        """Replaces a signal by a function, which is appended to `keep`.
-
-        name: ELEMENT or ELEMENT.FIELD; function: a callback or the address of a C function; context: its first argument.
-        """
-        signal, error = lib.pw_signal(), lib.pw_error()
-        signal.type = lib.PW_FUNCTION
-        signal.function__eval = function if isinstance(function, int) else c.cast(function, c.c_void_p).value
-        signal.function__context = context
-        keep.append(function)
-        element, _, field = name.partition(".")
-        lib.core.pw_model_set_signal(model.pointer, element.encode(), (field or "value").encode(), c.byref(signal), c.byref(error))
+    @staticmethod
+    def _set_signal(model, name, signal):
+        """Replaces a signal.  name: ELEMENT or ELEMENT.FIELD."""
+        error, (element, _, field) = lib.pw_error(), name.partition(".")
+        as_signal = c.cast(c.byref(signal), c.POINTER(lib.pw_signal))
+        lib.core.pw_model_set_signal(model.pointer, element.encode(), (field or "value").encode(), as_signal, c.byref(error))
         lib.check(error)
+
+    # ---- Contents ----
+
+    @property
+    def bodies(self) -> dict:
+        """Names of the bodies: mass [kg] and inertia [kg m^2] of each."""
+        s = self._compile().pointer
+        mass, count = lib.core.pw_system_mass(s), lib.core.pw_system_bodies(s)
+        return {lib.text(lib.core.pw_system_body_name(s, i)): {"mass": mass[3 * i], "inertia": mass[3 * i + 2]} for i in range(count)}
+
+    @property
+    def elements(self) -> dict:
+        """Names of the elements: the type of each."""
+        count = c.c_int()
+        elements = lib.core.pw_model_elements(self._compile().model, c.byref(count))
+        return {lib.text(e.definition[0]): lib.text(e.kind.contents.name) for e in elements[:count.value]}
+
+    @property
+    def states(self) -> dict:
+        """Names of coordinates, velocities and first-order states: their units."""
+        units, groups = self._columns
+        return {name: units[name] for name in groups["states"]}
+
+    @property
+    def inputs(self) -> dict:
+        """Signals that a simulation may set (``open(inputs=...)``) or a function replace (``signals``): their units."""
+        s, core = self._compile().pointer, lib.core
+        return {lib.name_of(core.pw_system_signal_name, s, i): lib.text(core.pw_system_signal_unit(s, i)) for i in range(core.pw_system_signals(s))}
+
+    @property
+    def outputs(self) -> dict:
+        """Outputs of the model: their units."""
+        units, groups = self._columns
+        return {name: units[name] for name in groups["outputs"]}
+
+    @property
+    def columns(self) -> dict:
+        """All columns of results, with the ledger: their units."""
+        return dict(self._columns[0])
+
+    @functools.cached_property
+    def _columns(self):
+        return columns(self._compile().pointer, True)
 
     # ---- Running ----
 
@@ -337,6 +461,11 @@ class Model:
         ------
         InputError, InitialError, MethodError
         """
+        return Simulation(self, *self._prepare(1, 4, method, t_end, step, rtol, atol, max_steps, energy, inputs, specialise))
+
+    def _prepare(self, runs, stacklevel, method=None, t_end=None, step=None, rtol=None, atol=None, max_steps=None, energy=False,
+                 inputs=None, specialise="auto"):
+        """System, method, settings in C, and those that were given, of a number of runs with the arguments of `open`."""
         settings = lib.pw_settings()
         numbers = {"span": t_end, "step": step, "rtol": rtol, "atol": atol, "max_steps": max_steps}
         for name, value in numbers.items():
@@ -347,15 +476,15 @@ class Model:
         given |= {"specialise": specialise} if specialise != "auto" else {}
         given |= {"inputs": lib.numbers(inputs, "inputs")} if inputs else {}
         method = self.defaults["method"] if method is None else method
-        steps = lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(settings), self.defaults["step"], settings.span)
-        system, cells = self._compile(inputs or {})
+        steps = runs * lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(settings), self.defaults["step"], settings.span)
+        system = self._compile(inputs)
         if self._warns_of_unused:
-            warn_of_unused(method, given, 3)
+            warn_of_unused(method, given, stacklevel)
         if specialised(specialise, steps):
             settings.specialised = system.code()
             if system.no_code and self._warns_of_unused:
-                warnings.warn(f"general engine: {system.no_code}", stacklevel=3)
-        return Simulation(self, system, cells, method, settings, given)
+                warnings.warn(f"general engine: {system.no_code}", stacklevel=stacklevel)
+        return system, method, settings, given
 
     def _setting(self, name, value):
         """A setting by its name in C, as a number; the model's default for None, 0 if it has none."""
@@ -448,8 +577,6 @@ class Model:
                 lib.core.pw_linear_free(c.byref(linear))
 
     sweep = studies.sweep
-    check, compare, drift, steady, periodic, sensitivity, fit, optimise = map(
-        studies.analysis, ("check", "compare", "drift", "steady", "periodic", "sensitivity", "fit", "optimise"))
 
     @staticmethod
     def _linear(linear, system):
@@ -529,19 +656,16 @@ def _check_derivatives(name, function, count, t_end, call):
                 raise lib.InputError(f"signal {name}: the {what} at t = {t:.5g} s is {given:.6g}, but the derivative is {slope:.4g}")
 
 
-def _callback(name, function):
-    """The function of a signal as the library calls it, within a lib.Call."""
+def _guarded(compute):
+    """The function of a signal as the library calls it, within a lib.Call: compute(t, x, value, gradient) in Python."""
 
     @lib.eval_function
-    def evaluate(_context, t, _x, value, _gradient):
+    def evaluate(_context, t, x, value, gradient):
         call = lib.thread.call
         try:
             if call.failure is None:
                 call.inside = True
-                result = function(t)
-                call.inside = False
-                # the value last: without one, C has a failure
-                value[2], value[1], value[0] = (math.nan, math.nan, result) if result.__class__ is float else _numbers_of(result, name)
+                compute(call, t, x, value, gradient)
         except BaseException as failure:  # noqa: BLE001: nothing may pass through C
             call.inside, lib.thread.call = False, call
             if call.failure is None:
@@ -550,6 +674,33 @@ def _callback(name, function):
         return call.failure is not None
 
     return evaluate
+
+
+def _callback(name, function):
+    """The callback of a function of the time."""
+    def compute(call, t, _x, value, _gradient):
+        result = function(t)
+        call.inside = False
+        # the value last: without one, C has a failure
+        value[2], value[1], value[0] = (math.nan, math.nan, result) if result.__class__ is float else _numbers_of(result, name)
+
+    return _guarded(compute)
+
+
+def _feedback_callback(name, feedback):
+    """The callback of a function of time and states."""
+    count = len(feedback.reads)
+
+    def compute(call, t, x, value, gradient):
+        states = x[:count]
+        slopes = feedback._slopes(t, states, name) if gradient else []
+        found = feedback._value(t, states, name)
+        call.inside = False
+        for i, slope in enumerate(slopes):
+            gradient[i] = slope
+        value[2], value[1], value[0] = found
+
+    return _guarded(compute)
 
 
 def _numbers_of(result, name):

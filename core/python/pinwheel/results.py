@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import _program
+from ._figure import draw
 
 
 class Result:
@@ -86,6 +87,26 @@ class Result:
         """The names of the columns."""
         return self._column.keys()
 
+    _ipython_key_completions_ = keys
+
+    def values(self):
+        """The columns."""
+        return [self[name] for name in self._column]
+
+    def items(self):
+        """Pairs of a name and its column."""
+        return [(name, self[name]) for name in self._column]
+
+    def get(self, name: str, default=None):
+        """The column of this name, or the default if there is none.
+
+        Parameters
+        ----------
+        name : str
+        default : optional
+        """
+        return self[name] if name in self else default
+
     @property
     def final(self) -> dict:
         """The last sample, by name."""
@@ -102,6 +123,50 @@ class Result:
         return xarray.Dataset({n: ("t", self[n], {"units": self.units[n]}) for n in self._column if n != "t"},
                               coords={"t": ("t", self.t, {"units": "s"})})
 
+    def plot(self, *names: str):
+        """Draws the run with matplotlib.
+
+        Parameters
+        ----------
+        *names : str
+            Columns, each over the time, in one panel for each unit; by default: paths of bodies, wheels and markers, states,
+            energies.  Vertical lines show events.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        KeyError
+            For an unknown name, with the nearest one.
+        ImportError
+            If matplotlib is not installed.
+        """
+        return draw(self, names)
+
+    def animate(self, path=None):
+        """Writes a page with the animation, by repeating the run in the program.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            The file, "run.html"; by default, notebooks show the page.
+
+        Returns
+        -------
+        path, or the object that shows the page
+
+        Raises
+        ------
+        InputError
+            If the model has functions in Python, or inputs.
+        """
+        if path is not None:
+            _program.write_animation(self, path)
+            return path
+        return _Page(_program.animation(self))
+
     def __repr__(self):
         end = f", {self.reason}" if self.reason else ""
         reached = f" to t = {self.t[-1]:.6g} s" if len(self) else ""
@@ -110,6 +175,16 @@ class Result:
     def _repr_html_(self) -> str:
         """In notebooks: the animation."""
         return _program.animation(self)
+
+
+class _Page:
+    """A text of HTML that notebooks show."""
+
+    def __init__(self, text):
+        self._text = text
+
+    def _repr_html_(self):
+        return self._text
 
 
 def _nearest(name, names):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes as c
+import json
 import os
 import threading
 import time
@@ -14,41 +15,44 @@ import numpy as np
 
 from . import _library as lib
 from ._progress import watched
+from .ensemble import Ensemble, array, duration
 from .results import Result, _nearest
 
-_FIRST_COLUMNS = 9  # before the states: PW_RECORD_STATES
+_IN_USE = "the run is in use, by another thread or by the function that called this one"
 _MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # of the machine [bytes]
 
 
 class Inputs(MutableMapping):
     """Values of the signals that the user of a simulation sets, by name; no names can be added or removed."""
 
-    def __init__(self, cells: dict, changed: Callable[[], None]):
-        self._cells, self._changed = cells, changed
+    def __init__(self, names: list, values: np.ndarray):
+        self._index, self._values = {name: i for i, name in enumerate(names)}, values
 
     def __getitem__(self, name: str) -> float:
-        return self._cell(name).value
+        return float(self._values[self._at(name)])
 
     def __setitem__(self, name: str, value: float) -> None:
-        self._cell(name).value = _finite(value, f"input {name}")
-        self._changed()
+        self._values[self._at(name)] = _finite(value, f"input {name}")
 
     def __delitem__(self, name):
         raise TypeError("inputs cannot be removed")
 
     def __iter__(self):
-        return iter(self._cells)
+        return iter(self._index)
 
     def __len__(self):
-        return len(self._cells)
+        return len(self._index)
 
     def __repr__(self):
         return repr(dict(self))
 
-    def _cell(self, name):
-        if name not in self._cells:
-            raise KeyError(f"no input {name!r}{_nearest(name, self._cells)}; inputs are named when the simulation is opened")
-        return self._cells[name]
+    def _ipython_key_completions_(self):
+        return list(self._index)
+
+    def _at(self, name):
+        if name not in self._index:
+            raise KeyError(f"no input {name!r}{_nearest(name, self._index)}; inputs are named when the simulation is opened")
+        return self._index[name]
 
 
 def _finite(value, what):
@@ -96,33 +100,25 @@ def specialised(when: str, steps: float) -> bool:
     return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
 
 
-def warn_of_unused(method: str, given, stacklevel: int) -> None:
-    """Warns of settings (their names) without effect on a method, as the program does."""
+def adaptive(method: str) -> bool | None:
+    """Whether a method chooses its steps; None for an unknown one."""
     integrator = c.c_void_p()
     if lib.core.pw_method_parse(lib.encode(method, "method"), c.byref(integrator), None, None) != lib.PW_OK:
+        return None
+    return bool(lib.core.pw_method_adaptive(integrator, method.encode()))
+
+
+def warn_of_unused(method: str, given, stacklevel: int) -> None:
+    """Warns of settings (their names) without effect on a method, as the program does."""
+    controls_steps, tolerances = adaptive(method), [name for name in ("rtol", "atol") if name in given]
+    if controls_steps is None:
         return  # opening the run refuses it
-    adaptive, tolerances = lib.core.pw_method_adaptive(integrator, method.encode()), [name for name in ("rtol", "atol") if name in given]
-    if adaptive and "step" in given and not tolerances:
+    if controls_steps and "step" in given and not tolerances:
         warnings.warn(f"step has no effect: {method} chooses its steps by rtol, atol", stacklevel=stacklevel + 1)
-    if not adaptive and "max_steps" in given:
+    if not controls_steps and "max_steps" in given:
         warnings.warn(f"max_steps has no effect: {method} takes as many steps as step requires", stacklevel=stacklevel + 1)
-    if not adaptive and tolerances and "step" not in given:
+    if not controls_steps and tolerances and "step" not in given:
         warnings.warn(f"{tolerances[0]} has no effect: {method} takes steps of step", stacklevel=stacklevel + 1)
-
-
-def columns(s, ledger) -> tuple[dict, dict]:
-    """Of a compiled system: units of all columns by name, in their order; names of columns by group, as in :class:`Result`."""
-    core, width = lib.core, lib.core.pw_system_record_width(s, bool(ledger))
-    names = [lib.name_of(core.pw_system_record_name, s, i) for i in range(width)]
-    n = core.pw_system_coordinates(s)
-    reactions = _FIRST_COLUMNS + 3 * n + 2 * core.pw_system_contacts(s)
-    outputs = reactions + core.pw_system_rows(s)
-    entries = outputs + core.pw_system_outputs(s)
-    states = [names[_FIRST_COLUMNS + i] for i in range(2 * n) if not core.pw_system_state_hidden(s, i)]
-    groups = {"states": states, "reactions": names[reactions:outputs], "outputs": names[outputs:entries],
-              "ledger": names[entries:]}
-    units = {name: lib.text(core.pw_system_record_unit(s, i)) for i, name in enumerate(names)}
-    return units, groups
 
 
 class _Condition:
@@ -171,38 +167,40 @@ class Simulation:
     _run = None  # a closed run
     _cancelled = staticmethod(lambda: False)  # asked between calls of the library; True: ends the run as Ctrl-C does
 
-    def __init__(self, model, system, cells, method, settings, given):
+    def __init__(self, model, system, method, settings, given, stacklevel=4):
         self.model, self._system, self._settings = model, system, settings
-        self.method, self._given, self._restart = method, given, False
+        self.method, self._given = method, given
         self._lock, self._steps_per_call = threading.Lock(), 16
-        run = system.call(lib.core.pw_run_open, system.pointer, lib.encode(method, "method"), c.byref(settings))
-        self._run = lib.Handle(run, lib.core.pw_run_close, system)
-        self.inputs = Inputs(cells, self._input_changed)
-        self.changed = self._initial()
+        self._ensemble = Ensemble([system], method, settings)
+        self._run = self._ensemble.open(0)
+        self._values = self._ensemble.input[0]
+        self.inputs = Inputs(list(system.inputs), self._values)
+        self.random = np.random.default_rng()
+        self.changed = self._initial(stacklevel, model._warns_of)
+        for i in range(lib.core.pw_system_signals(system.pointer) if stacklevel else 0):
+            if notice := lib.name_of(lib.core.pw_system_table_notice, system.pointer, i, settings.span):
+                warnings.warn(f"model {model.name}: {notice}", stacklevel=3)
 
-    def _input_changed(self):
-        self._restart = True
-
-    def _initial(self):
-        """The attribute `changed`; warns of it, and of tables that do not cover the run."""
+    def _initial(self, stacklevel, warns_of):
+        """The attribute `changed`; warns of it."""
         s, core, report, changed, texts = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run.pointer), {}, []
         n, x = core.pw_system_coordinates(s), report.contents
+        if x.moved == 0:
+            return changed
         for i in range(2 * n):
             moved = core.pw_initial_moved(s, report, i)
             if not moved:
                 continue
             name = lib.name_of(core.pw_system_state_name, s, i)
             changed[name] = (x.q_given[i], x.q[i]) if i < n else (x.v_given[i - n], x.v[i - n])
-            if moved > 1 and self.model._warns_of(report, i):  # not of rounded values
+            if moved > 1 and warns_of(report, i):  # not of rounded values
                 texts.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}"
                              + ("" if core.pw_initial_given(report, i) else " (specified by the model)"))
         if texts[8:]:
             texts[8:] = [f"and {len(texts) - 8} more"]
-        if texts:
-            warnings.warn(f"model {self.model.name}: initial values were changed to satisfy the constraints: {', '.join(texts)}", stacklevel=4)
-        for i in range(core.pw_system_signals(s)):
-            if notice := lib.name_of(core.pw_system_table_notice, s, i, self._settings.span):
-                warnings.warn(f"model {self.model.name}: {notice}", stacklevel=4)
+        if texts and stacklevel:
+            warnings.warn(f"model {self.model.name}: initial values were changed to satisfy the constraints: {', '.join(texts)}",
+                          stacklevel=stacklevel)
         return changed
 
     def __enter__(self) -> Simulation:
@@ -221,7 +219,7 @@ class Simulation:
         if self._run is None:
             raise lib.Error("the run is closed")
         if not self._lock.acquire(blocking=False):
-            raise lib.Error("the run is in use, by another thread or by the function that called this one")
+            raise lib.Error(_IN_USE)
         try:
             if self._run is None:
                 raise lib.Error("the run is closed")
@@ -234,12 +232,15 @@ class Simulation:
         if self._run is not None:
             with self._used():
                 self._run = None
+                self._ensemble.close(0)
 
     @property
-    def t(self) -> float:
-        """The time reached [s]."""
+    def time(self) -> float:
+        """The time reached [s]; ``t`` is the same."""
         with self._used() as run:
             return lib.core.pw_run_time(run)
+
+    t = time
 
     @property
     def statistics(self) -> dict:
@@ -250,11 +251,213 @@ class Simulation:
     @staticmethod
     def _statistics(run):
         s = lib.core.pw_run_statistics(run).contents
-        return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations",
-                                                    "specialised", "unresolved", "position", "velocity", "g", "jv")}
+        counts = ("steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "specialised", "unresolved", "g", "jv")
+        return {**{name: getattr(s, name) for name in counts}, "residual.position": s.position, "residual.velocity": s.velocity}
 
     def _columns(self):
-        return columns(self._system.pointer, self._settings.ledger)
+        return self._ensemble.columns
+
+    # ---- Control ----
+
+    def step(self, inputs=None, dt: float | None = None) -> None:
+        """Sets inputs and advances, in a few microseconds.
+
+        Parameters
+        ----------
+        inputs : float, array_like of shape (inputs,) or dict, optional
+            Constant during the step, in the order in which they were named; by default those of the step before.
+        dt : float, optional
+            Duration [s]; by default the step size of the method.
+
+        Raises
+        ------
+        InputError, MethodError
+            After a MethodError the run stays where it failed.
+        """
+        if inputs is not None:
+            if inputs.__class__ is float and len(self._values) == 1:
+                self._values[0] = inputs
+            elif hasattr(inputs, "items"):
+                self.inputs.update(inputs)
+            else:
+                self._values[:] = array(np.atleast_1d(inputs), self._values.shape, "inputs")
+        dt = duration(dt, self._settings.step)
+        if not self._lock.acquire(blocking=False):
+            raise lib.Error(_IN_USE)
+        try:
+            if self._run is None:
+                raise lib.Error("the run is closed")
+            self._ensemble.step(dt)
+            self._ensemble.check(0)
+        finally:
+            self._lock.release()
+
+    def observe(self, names=None) -> np.ndarray:
+        """Columns at the time reached.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Names of columns, as in :class:`Result`; by default, the states.  A tuple is looked up fastest.
+
+        Returns
+        -------
+        ndarray, shape (len(names),)
+            An array that the next call with these names overwrites.
+
+        Raises
+        ------
+        KeyError
+            For an unknown name, with the nearest one.
+        InputError, MethodError
+        """
+        store, values, _ = self._ensemble.plan(self.states if names is None else names)
+        if not self._lock.acquire(blocking=False):
+            raise lib.Error(_IN_USE)
+        try:
+            if self._run is None:
+                raise lib.Error("the run is closed")
+            store()
+            self._ensemble.check(0)
+        finally:
+            self._lock.release()
+        return values[0]
+
+    def reset(self, state=None, seed: int | None = None) -> None:
+        """Starts again at time 0, with the initial inputs.
+
+        Parameters
+        ----------
+        state : dict, array_like or callable, optional
+            Initial values of states by name, or an array over ``states``, or a function of ``random`` that returns a dict;
+            others are the model's.  They are made consistent with the constraints: see ``changed``.
+        seed : int, optional
+            Makes ``random`` a new generator.
+
+        Raises
+        ------
+        InputError, InitialError
+            The run is what it was.
+        """
+        if seed is not None:
+            self.random = np.random.default_rng(seed)
+        self._reopen(state(self.random) if callable(state) else state, 0.0, lib.core.pw_initial_given)
+        self._values[:] = list(self._system.inputs.values())
+
+    def _reopen(self, state, t, warns_of):
+        with self._used():
+            self._run = self._ensemble.open(0, self._ensemble.numbers(state), t)
+            self.changed = self._initial(4, warns_of)
+
+    @property
+    def states(self) -> list:
+        """Names of the states: coordinates, velocities, first-order states."""
+        return self._ensemble.states
+
+    @property
+    def state(self) -> dict:
+        """Values of the states by name; ``observe ()`` has them as an array."""
+        return dict(zip(self.states, self.observe().tolist()))
+
+    @property
+    def _parts(self):
+        """Slices of positions, velocities and first-order states in the array of the states."""
+        n = len(self.states) - lib.core.pw_system_coordinates(self._system.pointer)
+        return slice(0, n), slice(n, 2 * n), slice(2 * n, None)
+
+    def set_state(self, q=None, v=None, z=None, t: float | None = None) -> None:
+        """Continues from another state; it is made consistent with the constraints: see ``changed``.
+
+        Parameters
+        ----------
+        q, v, z : array_like or dict, optional
+            Coordinates, velocities, first-order states, in the order of ``states`` or by name; others stay.
+        t : float, optional
+            Time [s]; by default it stays.
+
+        Raises
+        ------
+        InputError, InitialError, MethodError
+            The run is what it was.
+        """
+        state, numbers = self.observe().copy(), list(self._ensemble.number.values())
+        given = set()
+        for name, values, part in zip("qvz", (q, v, z), self._parts):
+            if hasattr(values, "items"):
+                own = self._ensemble.numbers(values)
+                state[[numbers.index(i) for i in own]] = list(own.values())
+            elif values is not None:
+                state[part] = array(values, state[part].shape, name)
+                own = numbers[part]
+            given.update(own if values is not None else ())
+        self._reopen(state, self.time if t is None else _finite(t, "t"), lambda _, i: i in given)
+
+    def save(self) -> bytes:
+        """The state, from which :meth:`load` continues with the same bits as this simulation.
+
+        Methods of several steps (adams, bdf, ida) restart here.
+
+        Returns
+        -------
+        bytes
+
+        Raises
+        ------
+        MethodError
+            Near a singular configuration: try after the next step.
+        """
+        archive = lib.pw_archive()
+        with self._used() as run:
+            self._ensemble.step(0.0)  # inputs
+            self._ensemble.check(0)
+            try:
+                self._system.call(lib.core.pw_run_save, run, c.byref(archive))
+                saved = c.string_at(archive.at, archive.used) if archive.used else b""
+            finally:
+                lib.core.pw_archive_free(c.byref(archive))
+        if not saved:
+            raise lib.MethodError(f"t = {self.time:.6g} s: near a singular configuration states cannot be saved: try after the next step")
+        (start, t), inputs = self._ensemble.started[0], self._values.tolist()
+        return json.dumps([list(start.items()), t, inputs]).encode() + b"\n" + saved
+
+    def load(self, saved: bytes) -> None:
+        """Continues from a state of :meth:`save` of a simulation of this model with this method, settings and inputs.
+
+        Parameters
+        ----------
+        saved : bytes
+
+        Raises
+        ------
+        InputError
+            For bytes of something else; the run is what it was.
+        """
+        try:
+            head, _, rest = bytes(saved).partition(b"\n")
+            start, t, inputs = json.loads(head)
+            start, t, inputs = {int(i): float(x) for i, x in start}, float(t), array(inputs, self._values.shape, "inputs")
+        except (TypeError, ValueError, RecursionError):
+            raise lib.InputError("load: expected the bytes of a simulation that was saved, with the same inputs") from None
+        buffer = c.create_string_buffer(rest, len(rest))
+        archive = lib.pw_archive(at=c.addressof(buffer), size=len(rest), loading=1)
+        with self._used():
+            former, started = self._run, self._ensemble.started[0]
+            run = self._ensemble.open(0, start, t)
+            try:
+                self._system.call(lib.core.pw_run_load, run.pointer, c.byref(archive))
+            except BaseException:
+                self._ensemble.put(0, former, started)
+                raise
+            self._run = run
+            self._values[:] = inputs
+
+    def clone(self) -> Simulation:
+        """Another simulation in the same state, which continues with the same bits."""
+        other = Simulation(self.model, self._system, self.method, lib.pw_settings.from_buffer_copy(self._settings), self._given, 0)
+        other.load(self.save())
+        other.random.bit_generator.state = self.random.bit_generator.state
+        other.changed = self.changed
+        return other
 
     # ---- Steps of the caller ----
 
@@ -399,7 +602,7 @@ class Simulation:
         if times is None:
             every = lib.number(every, "every", above=0)
             count = np.floor((t_end - start) / every * (1 + 1e-12))
-            if not count * 8 * _FIRST_COLUMNS < _MEMORY:
+            if not count * 8 * lib.PW_RECORD_STATES < _MEMORY:
                 raise lib.ResourceError(f"every = {every}: {count:g} samples: out of memory")
             times = start + every * np.arange(count + 1)
             return np.append(times[:-1], t_end) if abs(times[-1] - t_end) < 1e-9 * every else np.append(times, t_end)
@@ -420,9 +623,9 @@ class Simulation:
         """
         rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
         start, now = lib.core.pw_run_time(run), lib.core.pw_run_time
-        if self._restart:
-            self._system.call(lib.core.pw_run_restart, run, None, None)
-            self._restart = False
+        if self.inputs:
+            self._ensemble.step(0.0)
+            self._ensemble.check(0)
         if times is None:
             self._call(run, np.array([start]), start, rows, 1.0)
         if condition:

@@ -5,49 +5,97 @@ from __future__ import annotations
 import concurrent.futures
 import csv
 import ctypes as c
+import functools
+import inspect
 import itertools
 import json
 import os
 import pathlib
 import tempfile
-import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar, Union, cast
 
 import numpy as np
 
 from . import _library as lib
 from . import _program
 from ._progress import watched
-from .simulation import columns, specialised, warn_of_unused
+from .ensemble import Ensemble, columns
+from .simulation import adaptive, specialised, warn_of_unused
 
 # ---- Sweeps ----
 
-def _final(model, parameters, start, method, t_end, settings, error=False, cancelled=None):
-    """The last sample of one run, {} if it failed; the units of its columns; why it failed, or "".
+# The function that a run asks whether to stop: the length of a text, which is empty until the runs are to stop.
+_STRLEN = c.cast(c.CDLL(None).strlen, c.c_void_p).value
 
-    Executors call it in threads or other processes; cancelled: a function that says whether to stop.
+
+def _runs(model, points, starts, method, end, settings, lanes=False, error=False, stop=None):
+    """Some points of a sweep, in blocks: units of columns by name; last samples, NaN of runs that failed; why these failed.
+
+    Executors call it in threads or other processes.  starts: names of states among those varied; lanes: whether to use
+    code for several runs at once; stop: a buffer, a text in which ends the runs.
     """
-    varied = model.replace(start=start, **parameters)
-    varied._warns_of, varied._warns_of_unused = lib.core.pw_initial_given, False  # as the program does
-    end = varied.defaults["t_end"] if t_end is None else t_end
-    units, _ = columns(varied._compile()[0].pointer, settings.get("energy"))
+    stop, blocks, models = stop or c.create_string_buffer(1), [], []
+    for parameters, group in itertools.groupby(points, lambda p: {n: x for n, x in p.items() if n not in starts}):
+        models += [model.replace(**parameters)] * len(list(group))
+    values = [{n: x for n, x in p.items() if n in starts} for p in points]
+    while models:
+        system, chosen, given, _ = models[0]._prepare(1, 0, method, end or None, **settings)
+        alike = itertools.takewhile(lambda m: system.has_columns_of(m._compile(), given.ledger) and not system.in_python, models[1:])
+        count = 1 if error else 1 + len(list(alike))
+        given.stop, given.stop_context = _STRLEN, c.addressof(stop)
+        blocks.append(_with_errors(models[0], values[0], method, end, settings, stop) if error else
+                      _final([m._compile() for m in models[:count]], values[:count], chosen, given, end, system.lanes() if lanes else None))
+        models, values = models[count:], values[count:]
+    return blocks
+
+
+def _final(systems, starts, method, settings, end, lanes):
+    """A block of `_runs`, of systems with the same columns."""
+    ensemble, reasons = Ensemble(systems, method, settings, lanes=lanes), [""] * len(systems)
+    for i, start in enumerate(starts):
+        try:
+            ensemble.open(i, ensemble.numbers(start))
+        except (lib.InitialError, lib.MethodError) as failure:
+            reasons[i] = str(failure)
+        except Exception as failure:
+            reasons[i] = _reason(failure)
     try:
-        with varied.open(method, t_end=end or None, **settings) as simulation:
-            simulation._cancelled = cancelled or simulation._cancelled
-            if not error:
-                simulation.advance(end)
-                return simulation.sample(), units, ""
+        ensemble.step(end)
+    except Exception as failure:
+        reasons[0] = _reason(failure)  # there is one run of a model with functions in Python
+        ensemble.close(0)
+    store, values, _ = ensemble.plan(ensemble.columns[0])
+    store()
+    return ensemble.columns[0], values, [why or ensemble.error(i) for i, why in enumerate(reasons)]
+
+
+def _with_errors(model, start, method, end, settings, stop):
+    """A block of `_runs`, of one run, with the stated errors of its states."""
+    model = model.replace(start=start)
+    units, groups = columns(model._compile().pointer, settings.get("energy"))
+    units |= {f"error.{name}": units[name] for name in groups["states"]}
+    failed = np.full((1, len(units)), np.nan)
+    try:
+        with model.open(method, t_end=end or None, **settings) as simulation:
+            simulation._cancelled = lambda: bool(stop.value)
             result = simulation.record(end, times=np.linspace(0, end, 101))
             if result.status == "failed":
-                return {}, units, result.reason
+                return units, failed, [result.reason]
             simulation._state_error(result)
-            stated = {f"error.{name}": (result.error or {}).get(name, (np.nan,))[0] for name in result.states}
-            return result.final | stated, units | {f"error.{name}": units[name] for name in result.states}, ""
     except (lib.InitialError, lib.MethodError) as failure:
-        return {}, units, str(failure)
+        return units, failed, [str(failure)]
     except Exception as failure:
-        if not (reason := lib.raised_by_function(failure)):
-            raise
-        return {}, units, f"{reason}: {type(failure).__name__}: {failure}"
+        return units, failed, [_reason(failure)]
+    stated = [(result.error or {}).get(name, (np.nan,))[0] for name in result.states]
+    return units, np.array([[*result.rows[-1], *stated]]), [""]
+
+
+def _reason(failure):
+    """Why a function in Python has ended a run; raises what is none of its exceptions."""
+    if reason := lib.raised_by_function(failure):
+        return f"{reason}: {type(failure).__name__}: {failure}"
+    raise failure
 
 
 def _points(vary):
@@ -63,16 +111,16 @@ def _points(vary):
     return names, values, [dict(zip(names, map(float, point))) for point in itertools.product(*values)]
 
 
-def _specialise(model, runs, method, t_end, settings):
-    """The setting ``specialise`` of all runs, which depends on the steps of the whole sweep, as in the program."""
+def _specialise(model, runs, method, end, settings):
+    """The setting ``specialise`` of all runs, and whether to use lanes: both depend on the steps of the whole sweep, as in
+    the program."""
     when, given = settings.pop("specialise", "auto"), lib.pw_settings()
     for name in ("step", "rtol"):
         setattr(given, name, model._setting(name, settings.get(name)))
-    method = model.defaults["method"] if method is None else method
     warn_of_unused(method, [name for name, value in settings.items() if value is not None], 3)
-    end = model.defaults["t_end"] if t_end is None else t_end
     steps = runs * lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(given), model.defaults["step"], end)
-    return "always" if specialised(when, steps) else "never"
+    always = specialised(when, steps)
+    return "always" if always else "never", always and steps >= 10 * lib.PW_SPECIALISE_STEPS and not adaptive(method)
 
 
 def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None = None,
@@ -105,34 +153,40 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
         For a value that the model refuses; runs that fail only leave NaN.
     """
     names, values, points = _points(vary)
-    t_end = None if t_end is None else lib.number(t_end, "t_end")
-    settings["specialise"] = _specialise(model, len(points), method, t_end, dict(settings))
-    pool, cancelled = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count()), threading.Event()
-    watch = [cancelled.is_set] if executor is None else []  # it cannot be sent to other processes
+    end = model.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
+    method = model.defaults["method"] if method is None else method
+    settings["specialise"], lanes = _specialise(model, len(points), method, end, dict(settings))
+    pool, stop = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count()), c.create_string_buffer(2)
+    own = {"stop": stop} if executor is None else {}  # it cannot be sent to other processes
     if not hasattr(pool, "submit"):
         raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
-        system = model._compile()[0].pointer
+        system, quiet = model._compile().pointer, model.replace()
+        quiet._warns_of, quiet._warns_of_unused = lib.core.pw_initial_given, False  # as the program does
         starts = {n for n in names if n not in model.parameters
                   and ("." in n or lib.core.pw_system_find_state(system, n.encode(), None) >= 0)}
-        pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n not in starts},
-                               {n: x for n, x in p.items() if n in starts}, method, t_end, settings, error, *watch)
-                   for p in points]
+        size = max(8 if lanes else 1, min(64, len(points) // (4 * (os.cpu_count() or 1))))  # runs in one call of the library
+        pending = [pool.submit(_runs, quiet, points[i:i + size], starts, method, end, settings, lanes, error, **own)
+                   for i in range(0, len(points), size)]
         with watched(progress) as report:
-            rows = [(future.result(), report((i + 1) / len(pending)))[0] for i, future in enumerate(pending)]
+            blocks = [block for i, future in enumerate(pending) for block in (future.result(), report((i + 1) / len(pending)))[0]]
     finally:
-        cancelled.set()
+        stop.value = b"x"
         if executor is None:
             pool.shutdown(cancel_futures=True)
-    return _table(dict(zip(names, values)), rows, model.units)
+    return _table(dict(zip(names, values)), blocks, model.units)
 
 
-def _table(values, rows, units):
-    """The result of a sweep.  values: those varied, by name; rows: results of _final; units: those of parameters."""
+def _table(values, blocks, units):
+    """The result of a sweep.  values: those varied, by name; blocks: results of _runs; units: those of parameters."""
     shape = [len(v) for v in values.values()]
-    names = next((of for row, of, _ in rows if row), rows[0][1])
-    table = {name: np.array([row.get(name, np.nan) for row, _, _ in rows]).reshape(shape) for name in names}
-    table["failed"] = np.array([why for _, _, why in rows], dtype=object).reshape(shape)
+    names = next((of for of, _, reasons in blocks if not all(reasons)), blocks[0][0])
+
+    def column(name):
+        return [rows[:, list(of).index(name)] if name in of else np.full(len(rows), np.nan) for of, rows, _ in blocks]
+
+    table = {name: np.concatenate(column(name)).reshape(shape) for name in names}
+    table["failed"] = np.array([why for *_, reasons in blocks for why in reasons], dtype=object).reshape(shape)
     try:
         import xarray
     except ImportError:
@@ -183,46 +237,252 @@ def help_of(name: str) -> str:
     return _program.run([lib.encode(name, "command").decode(), "--help"]).stdout
 
 
-_SUMMARIES = {
-    "check": "Checks mobility, redundancy, initial conditions, derivatives and stability.",
-    "compare": "Compares the accuracy and cost of methods against a reference solution.",
-    "drift": "Compares the drift of constraints and energy in long runs, by stabilisation.",
-    "steady": "Finds steady motions, and follows them over a parameter.",
-    "periodic": "Finds periodic motions, and follows them over a parameter.",
-    "sensitivity": "Differentiates outputs of a run with respect to parameters and initial values.",
-    "fit": "Fits parameters and initial values to measured data.",
-    "optimise": "Finds the parameters for which an output is largest or smallest.",
-}
-_RETURNS = dict.fromkeys(("compare", "drift"), "Columns of the table: arrays of shape (rows,), with units in their names.")
+_RUN_OPTIONS = """method, t_end, step, rtol, atol, max_steps, limit, jobs, specialise : optional
+            Integrator, final time [s], step size [s], tolerances, most attempted steps, processor time of a run [s], number of
+            concurrent runs, and when to compile code, as on the command line."""
+_RAISES = """Raises
+        ------
+        InputError, InitialError, MethodError, ResourceError
+            With the program's message."""
 
 
-def analysis(name):
-    """The method of :class:`Model` that runs a command of the program."""
+_Method = TypeVar("_Method", bound=Callable[..., Any])
 
+
+def _analysis(function: _Method) -> _Method:
+    """A method that runs the command of its name; each argument that is not None is the option of its name."""
+    signature = inspect.signature(function)
+    name = function.__name__
+
+    @functools.wraps(function)
     def method(self, *arguments, **options):
-        return _report(name, self, arguments, options, tables=True)
+        try:
+            given = signature.bind(self, *arguments, **options).arguments
+        except TypeError as failure:
+            raise lib.InputError(f"{name}: {failure}; see help(pinwheel.Model.{name})") from None
+        del given["self"]
+        return _report(name, self, (), given, tables=True)
 
-    method.__name__, method.__qualname__, method.__module__ = name, f"Model.{name}", "pinwheel"
-    method.__doc__ = f"""{_SUMMARIES[name]}
+    method.__doc__ = (function.__doc__ or "").replace("RUN", _RUN_OPTIONS).replace("RAISES", _RAISES)
+    return cast(_Method, method)
 
-        Runs ``pinwheel {name}`` with this model, its parameters and initial values.
 
-        Parameters
-        ----------
-        *arguments, **options
-            Options of the command, see ``print(pw.help_of("{name}"))``; for their form see :func:`command`.
+_Names = Union[str, Sequence[str]]
+_Free = Union[_Names, Mapping[str, Any]]
+
+
+class Analyses:
+    """Analyses of a model: they run the program's commands of the same names, with its parameters and initial values."""
+
+    @_analysis
+    def check(self) -> dict:  # type: ignore[empty-body]
+        """Checks mobility, redundancy, initial conditions, derivatives and stability.
 
         Returns
         -------
         dict
-            {_RETURNS.get(name, "The command's JSON.")}
+            The command's JSON.
 
-        Raises
-        ------
-        InputError, InitialError, MethodError, ResourceError
-            With the program's message.
+        RAISES
         """
-    return method
+
+    @_analysis
+    def compare(self, *, methods: _Names | None = None, t_end: float | None = None, limit: float | None = None,  # type: ignore[empty-body]
+                repeats: int | None = None, jobs: int | None = None, rtol_ladder: tuple | str | None = None,
+                step_ladder: tuple | str | None = None, reference: str | None = None, specialise: str | None = None) -> dict:
+        """Compares the accuracy and cost of methods against a reference solution.
+
+        Parameters
+        ----------
+        methods : str or list of str, optional
+            Methods, "rk4,erk8".
+        t_end, limit, specialise : optional
+            Final time [s], processor time of a run [s], when to compile code.
+        repeats, jobs : int, optional
+            Timed repetitions of each run; methods that run at a time.
+        rtol_ladder, step_ladder : pair of float, optional
+            First and last tolerance of adaptive methods, and step of others.
+        reference : str, optional
+            The path of a table with which runs are compared.
+
+        Returns
+        -------
+        dict
+            Columns of the table: arrays of shape (rows,), with units in their names.
+
+        RAISES
+        """
+
+    @_analysis
+    def drift(self, *, methods: _Names | None = None, t_end: float | None = None, step: float | None = None,  # type: ignore[empty-body]
+              rtol: float | None = None, max_steps: int | None = None, limit: float | None = None, jobs: int | None = None,
+              vary: Mapping[str, Any] | None = None, only_methods: bool = False, specialise: str | None = None) -> dict:
+        """Compares the drift of constraints and energy in long runs, by stabilisation.
+
+        Parameters
+        ----------
+        methods : str or list of str, optional
+            Methods, "rk4+all".
+        vary : dict, optional
+            Values of an option of stabilisations.
+        only_methods : bool
+            Leave out how drift depends on options.
+        t_end, step, rtol, max_steps, limit, jobs, specialise : optional
+            As in :meth:`sensitivity`.
+
+        Returns
+        -------
+        dict
+            Columns of the table: arrays of shape (rows,), with units in their names.
+
+        RAISES
+        """
+
+    @_analysis
+    def steady(self, *, hold: Mapping[str, float] | None = None, vary: Mapping[str, Any] | None = None,  # type: ignore[empty-body]
+               starts: int | None = None, at: float | None = None, limit: float | None = None) -> dict:
+        """Finds steady motions, and follows them over a parameter.
+
+        Parameters
+        ----------
+        hold : dict, optional
+            Values of states, or of BODY.speed, .radius or .curvature, that the motions have.
+        vary : dict, optional
+            A parameter, or a held value, and the first and last value: ``{"m1": (1, 5)}``.
+        starts : int, optional
+            Number of random states from which motions are sought.
+        at : float, optional
+            Time at which signals are evaluated [s].
+        limit : float, optional
+            Processor time [s].
+
+        Returns
+        -------
+        dict
+            The command's JSON.
+
+        RAISES
+        """
+
+    @_analysis
+    def periodic(self, *, period: float | str | None = None, periods: int | None = None, guess: float | None = None,  # type: ignore[empty-body]
+                 vary: Mapping[str, Any] | None = None, method: str | None = None, rtol: float | None = None,
+                 limit: float | None = None) -> dict:
+        """Finds periodic motions, and follows them over a parameter.
+
+        Parameters
+        ----------
+        period : float or "free", optional
+            [s]; by default that of the signals.
+        periods : int, optional
+            Number of periods of the signals after which the motion repeats.
+        guess : float, optional
+            First guess of a free period [s].
+        vary : dict, optional
+            A parameter, and its first and last value.
+        method, rtol, limit : optional
+            Adaptive integrator, its tolerance, processor time [s].
+
+        Returns
+        -------
+        dict
+            The command's JSON.
+
+        RAISES
+        """
+
+    @_analysis
+    def sensitivity(self, of: _Names, by: _Names, *, every: float | None = None, until: str | None = None,  # type: ignore[empty-body]
+                    method: str | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
+                    atol: float | None = None, max_steps: int | None = None, limit: float | None = None,
+                    jobs: int | None = None, specialise: str | None = None) -> dict:
+        """Differentiates outputs of a run with respect to parameters and initial values.
+
+        Parameters
+        ----------
+        of : str or list of str
+            Columns at the end, or outputs such as "max:board.x".
+        by : str or list of str
+            Parameters, initial values of states.
+        every : float, optional
+            Time between rows of the table [s].
+        until : str, optional
+            A condition at whose instant runs end.
+        RUN
+
+        Returns
+        -------
+        dict
+            The command's JSON.
+
+        RAISES
+        """
+
+    @_analysis
+    def fit(self, data, columns: _Names, free: _Free, *, sigma: Mapping[str, Any] | None = None,  # type: ignore[empty-body]
+            confidence: float | None = None, starts: int | None = None, time: str | None = None,
+            time_scale: float | None = None, time_offset: float | None = None, method: str | None = None,
+            t_end: float | None = None, step: float | None = None, rtol: float | None = None, atol: float | None = None,
+            limit: float | None = None, jobs: int | None = None, specialise: str | None = None) -> dict:
+        """Fits parameters and initial values to measured data.
+
+        Parameters
+        ----------
+        data : dict of arrays, DataFrame or path
+            Times "t", and columns with the names of results; NaN: not measured.
+        columns : str or list of str
+            The columns of the data to compare.
+        free : dict, str or list of str
+            Unknowns, with bounds: ``{"l": (0.5, 2)}``; None: without.
+        sigma : dict, optional
+            Standard deviations of columns: numbers, or names of columns of the data.
+        confidence : float, optional
+            Probability of confidence intervals.
+        starts : int, optional
+            Number of points from which to search.
+        time : str, optional
+            Column of the times.
+        time_scale, time_offset : float, optional
+            Factor of these times, and what is added to them [s].
+        RUN
+
+        Returns
+        -------
+        dict
+            The command's JSON.
+
+        RAISES
+        """
+
+    @_analysis
+    def optimise(self, free: _Free, *, maximise: str | None = None, minimise: str | None = None,  # type: ignore[empty-body]
+                 subject_to: _Names | None = None, starts: int | None = None, seed: int | None = None, until: str | None = None,
+                 method: str | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
+                 atol: float | None = None, max_steps: int | None = None, limit: float | None = None,
+                 jobs: int | None = None, specialise: str | None = None) -> dict:
+        """Finds the parameters for which an output is largest or smallest.
+
+        Parameters
+        ----------
+        free : dict, str or list of str
+            Unknowns, with bounds: ``{"theta": (-1, 1)}``.
+        maximise, minimise : str
+            One of them: an output such as "max:bob.vx", or an expression of outputs.
+        subject_to : str or list of str, optional
+            Constraints, "max:B.Fx <= 10".
+        starts, seed : int, optional
+            Number of points from which to search, and the seed of their choice.
+        until : str, optional
+            A condition at whose instant runs end.
+        RUN
+
+        Returns
+        -------
+        dict
+            The command's JSON.
+
+        RAISES
+        """
 
 
 def _report(name, model, arguments, options, tables):
@@ -264,7 +524,9 @@ def _words(key, value, folder):
     if value is None or value is False:
         return []
     if hasattr(value, "items"):
-        return [f"{option}={name}={_value(x)}" for name, x in value.items()]
+        return [f"{option}={name}" + ("" if x is None else f"={_value(x)}") for name, x in value.items()]
+    if key in ("columns", "methods") or key.endswith("_ladder"):
+        value = value if isinstance(value, str) else (":" if key.endswith("_ladder") else ",").join(map(str, value))
     return [option if item is True else f"{option}={item}" for item in (value if isinstance(value, _LISTS) else [value])]
 
 
