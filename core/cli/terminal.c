@@ -357,15 +357,9 @@ int pw_table_pass (pw_table *table) {
   return table->pass++ < 2;
 }
 
-/* Characters of a UTF-8 text. */
-static int table_length (const char *text) {
-  int length = 0;
-  for (; *text; text++) length += ((unsigned char)*text & 0xC0) != 0x80;
-  return length;
-}
-
 int pw_cell (pw_table *table, int width, const char *text) {
-  int length = table_length (text), *widest = &table->width[table->column++];
+  int length = 0, *widest = &table->width[table->column++]; /* length: characters of UTF-8 */
+  for (const char *c = text; *c; c++) length += ((unsigned char)*c & 0xC0) != 0x80;
   if (*widest < abs (width)) *widest = abs (width);
   if (*widest < length) *widest = length;
   if (table->pass == 1) return 0;

@@ -236,9 +236,8 @@ void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts
   npz_bytes (z, value, size);
 }
 
-/* Writes the directory, and the end record: disk 0, entries, size and offset of the directory, no comment. */
-static void npz_directory (pw_npz *z) {
-  unsigned long start = z->at;
+int pw_npz_end (pw_npz *z, pw_error *error) {
+  unsigned long start = z->at; /* of the directory */
   for (const struct pw_npz_entry *e = z->entry; e < z->entry + z->count; e++) {
     npz_number (z, NPZ_ENTRY, 4);
     npz_number (z, NPZ_VERSION, 2);
@@ -248,17 +247,13 @@ static void npz_directory (pw_npz *z) {
     npz_bytes (z, e->name, strlen (e->name));
   }
   unsigned long size = z->at - start;
-  npz_number (z, NPZ_END, 4);
+  npz_number (z, NPZ_END, 4); /* then disk 0, entries, size and offset of the directory, no comment */
   npz_number (z, 0, 4);
   npz_number (z, (unsigned long)z->count, 2);
   npz_number (z, (unsigned long)z->count, 2);
   npz_number (z, size, 4);
   npz_number (z, start, 4);
   npz_number (z, 0, 2);
-}
-
-int pw_npz_end (pw_npz *z, pw_error *error) {
-  npz_directory (z);
   free (z->entry);
   z->entry = NULL;
   if (z->failed) return pw_fail (error, PW_RESOURCE, "out of memory");

@@ -441,18 +441,15 @@ int pw_output_ready (pw_output *o, pw_error *error) {
   return o->code ? output_fail_with_part (o, o->code, error) : PW_OK;
 }
 
-/* Truncates the temporary file after its last complete line. */
-static void output_truncate (pw_output *o) {
-  char c;
-  off_t end = lseek (o->file, 0, SEEK_END), keep = end;
-  while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
-  if (keep < end && ftruncate (o->file, keep) != 0) return; /* keep the incomplete line */
-}
-
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
   if (o->stream) output_close (o, fflush (o->stream));
   buffer[0] = 0;
-  if (*o->part && !pw_output_named (o, ".npz")) output_truncate (o); /* archives are complete, and have no lines */
+  if (*o->part && !pw_output_named (o, ".npz")) { /* archives are complete, and have no lines */
+    char c;
+    off_t end = lseek (o->file, 0, SEEK_END), keep = end; /* to the last complete line */
+    while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
+    if (keep < end) (void)!ftruncate (o->file, keep);
+  }
   if (*o->part) snprintf (buffer, size, "%s", o->part);
   output_free (o);
   return *buffer ? buffer : NULL;

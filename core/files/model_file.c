@@ -671,16 +671,6 @@ static char *cache_parent (char parent[PW_PATH]) {
   return home && *home == '/' ? pw_path (parent, "%s/.cache", home) : NULL;
 }
 
-/* Makes a folder and those above it. */
-static void cache_make (char *path) {
-  for (char *slash = strchr (path + 1, '/'); slash; slash = strchr (slash + 1, '/')) {
-    *slash = 0;
-    mkdir (path, 0700);
-    *slash = '/';
-  }
-  mkdir (path, 0700);
-}
-
 /* Why a folder cannot be used, or NULL: others can write to it or, if it is the parent, replace what it contains. */
 static const char *cache_defect (const char *path, int is_parent) {
   struct stat info;
@@ -697,7 +687,13 @@ static const char *cache_defect (const char *path, int is_parent) {
 static int cache_folder (char path[PW_PATH], char *notice, size_t size) {
   char parent[PW_PATH];
   if (cache_parent (parent) == NULL) return 0;
-  cache_make (pw_path (path, "%s/pinwheel", parent));
+  pw_path (path, "%s/pinwheel", parent);
+  for (char *slash = strchr (path + 1, '/'); slash; slash = strchr (slash + 1, '/')) { /* the folders above it */
+    *slash = 0;
+    mkdir (path, 0700);
+    *slash = '/';
+  }
+  mkdir (path, 0700);
   const char *faulty = parent, *defect = cache_defect (parent, 1);
   if (defect == NULL) defect = cache_defect (faulty = path, 0);
   if (defect) snprintf (notice, size, "the cache %s is not used: %s", faulty, defect);

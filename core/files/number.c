@@ -15,15 +15,6 @@
 #define strfromd snprintf
 #endif
 
-/* Replaces the locale's decimal point, which may be several bytes long. */
-static void number_point (char *text) {
-  size_t begin = strspn (text, "+-0123456789");
-  size_t length = strcspn (text + begin, "+-0123456789e");
-  if (length == 0) return;
-  text[begin] = '.';
-  memmove (text + begin + 1, text + begin + length, strlen (text + begin + length) + 1);
-}
-
 /* ---- The shortest text that reads back as the same number ----
  *
  * (Giulietti 2020, The Schubfach way to render doubles.) */
@@ -128,7 +119,9 @@ char *pw_format (char buffer[32], double value, int digits) {
   if (isinf (value)) return strcpy (buffer, value > 0 ? "inf" : "-inf");
   if (digits >= 17) return number_shortest (buffer, value), buffer;
   strfromd (buffer, 32, digits < 1 ? "%.1g" : format, value);
-  number_point (buffer);
+  char *point = buffer + strspn (buffer, "+-0123456789"); /* the locale's, which may be several bytes long */
+  size_t length = strcspn (point, "+-0123456789e");
+  if (length > 0) *point = '.', memmove (point + 1, point + length, strlen (point + length) + 1);
   return buffer;
 }
 

@@ -895,7 +895,10 @@ static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *e
   return PW_OK;
 }
 
-static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
+static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
+                              pw_error *error) {
+  if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  pw_evaluate_J (w);
   PW_EACH_CONSTRAINT (k, w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)
       for (int c = 0; c < k->b.cols; c++) {
@@ -905,13 +908,6 @@ static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
         out->column[out->entries] = column;
         out->value[out->entries++] = k->J[i * k->b.cols + c];
       }
-}
-
-static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
-                              pw_error *error) {
-  if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
-  pw_evaluate_J (w);
-  elements_jacobian (w, out);
   for (int j = 0; j < w->s->coords; j++) out->mass[j] = pw_is_hidden (w->s, j) ? 1 : w->s->M[j];
   pw_evaluate_force (w, out->force);
   pw_evaluate_g (w, out->g);

@@ -343,14 +343,6 @@ void pw_linear_asymmetry (pw_linearisation *x, double turn, double *out) {
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_length_factor (x->r->s, j) / linear_unit (x);
 }
 
-/* The largest asymmetry of a symmetry: round-off, relative to 1 + 1e-4 x the largest derivative of an acceleration. */
-static double linear_tolerance (const pw_linearisation *x) {
-  double most = 0, T = x->r->w->scale.time;
-  for (int i = x->positions; i < x->size; i++)
-    for (int k = 0; k < x->size; k++) most = pw_larger_or_nan (most, fabs (x->A[i * x->size + k]) * T);
-  return PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most;
-}
-
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
   double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
          *VT = sigma + n;
@@ -381,7 +373,11 @@ static int linear_symmetries (pw_linearisation *x) {
   }
   for (int i = 0; i < 3 * length; i++)
     if (!isfinite (x->residual[i])) return 0;
-  const int symmetries = pw_null_space (length, 3, x->residual, linear_tolerance (x), null);
+  double most = 0, T = x->r->w->scale.time; /* most: the largest derivative of an acceleration */
+  for (int i = x->positions; i < x->size; i++)
+    for (int k = 0; k < x->size; k++) most = pw_larger_or_nan (most, fabs (x->A[i * x->size + k]) * T);
+  const double tolerance = PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most; /* of round-off */
+  const int symmetries = pw_null_space (length, 3, x->residual, tolerance, null);
   for (int c = 0; c < x->size; c++) {
     double S[3] = { x->symmetry[c], x->symmetry[x->size + c], x->symmetry[2 * x->size + c] };
     for (int k = 0; k < symmetries; k++)

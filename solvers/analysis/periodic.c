@@ -464,14 +464,6 @@ static void equations_orthogonal (pw_periodic *x, int rows, double *dF) {
   }
 }
 
-/* The derivatives with respect to the period. */
-static void equations_by_period (pw_periodic *x, double *column) {
-  for (int j = 0; j < x->n; j++) {
-    column[j] = x->y1[x->n + j] * x->T / pw_periodic_unit (x, j);
-    column[x->n + j] = x->a1[j] * x->T / pw_periodic_unit (x, x->n + j);
-  }
-}
-
 /* pw_branch_problem.evaluate.  The flow without derivatives comes last: the equations need its x->y0 to x->a1. */
 static int equations_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {
   pw_periodic *x = periodic;
@@ -483,7 +475,11 @@ static int equations_evaluate (void *periodic, const double *u, double *F, doubl
   if (dF == NULL) return PW_OK;
   equations_by_state (x, u, rows, dF);
   equations_by_displacement (x, u, rows, dF + states * rows);
-  if (x->settings.free) equations_by_period (x, dF + (pw_periodic_unknowns (x) - 1) * rows);
+  double *by_period = x->settings.free ? dF + (pw_periodic_unknowns (x) - 1) * rows : NULL;
+  for (int j = 0; by_period && j < x->n; j++) {
+    by_period[j] = x->y1[x->n + j] * x->T / pw_periodic_unit (x, j);
+    by_period[x->n + j] = x->a1[j] * x->T / pw_periodic_unit (x, x->n + j);
+  }
   equations_orthogonal (x, rows, dF);
   return PW_OK;
 }

@@ -490,13 +490,6 @@ static int steady_arrays (pw_steady *x) {
   return PW_OK;
 }
 
-/* The last breakpoint of signals within the span. */
-static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
-  double end = t + span, next = t;
-  for (int i = 0; i < STEADY_BREAKPOINTS && next <= end; i++) t = next, next = pw_next_breakpoint (w, 1, t);
-  return t;
-}
-
 /* PW_INPUT if a signal changes with time within the span: the message names the first one and, if no signal changes
  * after the last breakpoint, the time of this breakpoint, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
@@ -506,7 +499,9 @@ static int steady_constant (pw_steady *x, pw_error *error) {
   int changed, later, status = pw_signals_change (r, x->settings.t, 0, span, &changed, error);
   if (status != PW_OK || changed < 0) return status;
   const char *name = PW_NAME (pw_system_signal_name, x->s, changed);
-  double last = steady_last_breakpoint (r->w, x->settings.t, span);
+  double last = x->settings.t, next = last; /* the last breakpoint of signals within the span */
+  for (int i = 0; i < STEADY_BREAKPOINTS && next <= x->settings.t + span; i++)
+    last = next, next = pw_next_breakpoint (r->w, 1, last);
   status = pw_signals_change (r, last, 0, span, &later, error);
   if (status != PW_OK) return status;
   snprintf (text, sizeof text, "%.9g", last);

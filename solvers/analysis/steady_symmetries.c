@@ -36,15 +36,6 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
   for (int j = internal; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
 }
 
-/* What displacements of these rates change in the equations at x->q, x->v, in units of the scene. */
-static void symmetry_violation (pw_steady *x, const double *rates, double *out) {
-  pw_linearisation *l = &x->system.linearisation;
-  memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
-  pw_steady_velocities (x, rates, x->q, l->dx);
-  pw_linear_turn (l, rates[PW_RATE_TURN], x->v, l->dx + x->n);
-  pw_linear_asymmetry (l, rates[PW_RATE_TURN], out);
-}
-
 /* The largest change of an acceleration by a single coordinate, in units of the scene. */
 static double symmetry_largest_change (pw_steady *x) {
   pw_linearisation *l = &x->system.linearisation;
@@ -144,8 +135,13 @@ static int symmetry_length (const pw_steady *x) {
 static int symmetry_columns (pw_steady *x, int rows, double *M) {
   const double scale = 1 / (1 + 1e-4 * symmetry_largest_change (x));
   int finite = 1, length = symmetry_length (x) - 3;
-  for (int c = 0; c < x->symmetries; c++, M += rows) {
-    symmetry_violation (x, x->symmetry + c * pw_steady_rate_count (x->s), M);
+  pw_linearisation *l = &x->system.linearisation;
+  for (int c = 0; c < x->symmetries; c++, M += rows) { /* what displacements change in the equations at x->q, x->v */
+    const double *rates = x->symmetry + c * pw_steady_rate_count (x->s);
+    memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
+    pw_steady_velocities (x, rates, x->q, l->dx);
+    pw_linear_turn (l, rates[PW_RATE_TURN], x->v, l->dx + x->n);
+    pw_linear_asymmetry (l, rates[PW_RATE_TURN], M);
     for (int i = 0; i < length; i++) finite &= isfinite (M[i] *= scale);
   }
   return finite;
@@ -199,12 +195,6 @@ static void symmetry_keep_one_turn (pw_steady *x, int rates) {
       if (c == PW_RATE_TURN || fabs (rate[c]) < SYMMETRY_ZERO) rate[c] = 0;
     }
   }
-}
-
-/* The coordinate that rate c >= PW_RATE_ANGLES changes: the inverse of pw_steady_angle_rate. */
-static int symmetry_coordinate (const pw_steady *x, int c) {
-  int k = c - PW_RATE_ANGLES;
-  return k < x->s->bodies ? 3 * k + 2 : 2 * x->s->bodies + k;
 }
 
 /* Makes x->symmetry a basis whose rows are as sparse as possible. */
@@ -311,7 +301,8 @@ static double symmetry_angle (const pw_steady *x, const double *turn, const doub
 static double symmetry_time (const pw_steady *x, const double *rate, const double *q) {
   int c = pw_steady_rate_count (x->s) - 1;
   while (c >= PW_RATE_ANGLES && rate[c] == 0) c--;
-  if (c >= PW_RATE_ANGLES) return q[symmetry_coordinate (x, c)] / rate[c];
+  const int k = c - PW_RATE_ANGLES, bodies = x->s->bodies; /* the inverse of pw_steady_angle_rate */
+  if (k >= 0) return q[k < bodies ? 3 * k + 2 : 2 * bodies + k] / rate[c];
   double square = rate[PW_RATE_X] * rate[PW_RATE_X] + rate[PW_RATE_Y] * rate[PW_RATE_Y];
   return square > 0 ? (rate[PW_RATE_X] * q[0] + rate[PW_RATE_Y] * q[1]) / (x->L * square) : 0;
 }
@@ -375,13 +366,6 @@ static const struct {
   const char *name, *unit;
 } hold_of_body[PW_HOLD_OF_BODY] = { { "speed", "m/s" }, { "radius", "m" }, { "curvature", "1/m" } };
 
-static int hold_unknown (const pw_system *s, const char *name, pw_error *error) {
-  pw_nearest near = { .sought = name };
-  for (int i = 0; i < 2 * s->coords + PW_HOLD_OF_BODY * s->bodies; i++)
-    pw_nearest_try (&near, PW_NAME (pw_system_held_name, s, i));
-  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near));
-}
-
 int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK || pw_require (name, "a name", error) != PW_OK) return PW_INPUT;
   const char *dot = strrchr (name, '.');
@@ -392,7 +376,11 @@ int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) 
     if (b >= 0) return 2 * s->coords + b * PW_HOLD_OF_BODY + k;
   }
   int state = pw_system_find_state (s, name, &none);
-  return state >= 0 ? state : hold_unknown (s, name, error);
+  if (state >= 0) return state;
+  pw_nearest near = { .sought = name };
+  for (int i = 0; i < 2 * s->coords + PW_HOLD_OF_BODY * s->bodies; i++)
+    pw_nearest_try (&near, PW_NAME (pw_system_held_name, s, i));
+  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near));
 }
 
 char *pw_system_held_name (const pw_system *s, int held, char *buffer, size_t size) {

@@ -648,17 +648,6 @@ static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, dou
   for (int j = 0; j < e->count; j++) pw_add_scaled (out, slope[e->stage[j]], e->weight[j], n);
 }
 
-/* Reciprocal tolerances for the step from the state reached to the new state: for each coordinate those of its position
- * and its velocity. */
-static void adapt_weigh (const pw_run *r) {
-  const pw_method_data *d = r->data;
-  double *w = d->weight, rtol = r->settings.rtol;
-  for (int j = 0, n = r->s->coords; j < n; j++) {
-    *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
-    *w++ = 1 / (pw_atol (r, n + j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
-  }
-}
-
 /* Mean square of the errors r->q_at and r->v_at of positions and velocities in units of the tolerances. */
 static double adapt_mean_square (const pw_run *r) {
   const double *w = r->data->weight;
@@ -702,7 +691,11 @@ static double adapt_state (pw_run *r, int projected) {
   pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   d->stage_v[tableau->stages] = d->v, d->stage_a[tableau->stages] = d->a;
-  adapt_weigh (r);
+  double *w = d->weight, rtol = r->settings.rtol; /* reciprocal tolerances of positions and velocities */
+  for (int j = 0, n = r->s->coords; j < n; j++) {
+    *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
+    *w++ = 1 / (pw_atol (r, n + j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+  }
   double square5 = adapt_remaining (r, adapt_whole (r, &d->estimate[0]), projected);
   if (tableau->e3 == NULL) return sqrt (square5);
   double square3 = adapt_remaining (r, adapt_whole (r, &d->estimate[1]), projected);

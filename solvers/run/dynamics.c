@@ -113,14 +113,6 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
   return 1;
 }
 
-/* Both residuals of the state reached, unless one is known or the general engine has to evaluate them. */
-static void specialised_residuals (pw_run *r) {
-  if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
-    return;
-  r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
-  specialised_copy_residuals (r);
-}
-
 /* ---- The sine, which measures the distance from singular configurations; see method.h ---- */
 
 /* The index of the n-th body of element e; that of the ground is s->bodies. */
@@ -332,7 +324,10 @@ void pw_sample_reached (pw_run *r) {
 void pw_record_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
   pw_statistics *largest = &r->statistics;
-  specialised_residuals (r);
+  if (pw_specialised_suits (r) && !r->active && isnan (now->position) && isnan (now->velocity)) {
+    r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
+    specialised_copy_residuals (r);
+  }
   if (isnan (now->position)) pw_evaluate_position_residual (r->w, r->enforced, now);
   if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, r->enforced, now);
   largest->position = pw_larger (largest->position, now->position);

@@ -278,14 +278,6 @@ double pw_rank_independence (pw_run *r) {
   return isnan (most) ? 0 : 1 / most;
 }
 
-/* change = N z, where z has entries for redundant rows only. */
-static void redundancy_change (pw_run *r, const double *z, double *change) {
-  double *c = r->coefficient;
-  pw_add_JT (r->w, z, r->row_force);
-  redundancy_solve (r, c);
-  for (int i = 0; i < r->s->rows; i++) change[i] = z[i] - c[i];
-}
-
 /* slope = -N^T (lambda / square), without entries for active rows; (c_i, x) = J_i a with J_a a = x. */
 static void redundancy_slope (pw_run *r, const double *lambda, const double *square, double *slope) {
   double *x = r->coefficient, *a = r->row_force;
@@ -317,7 +309,10 @@ void pw_rank_least_norm (pw_run *r, double *lambda) {
     double now = redundancy_product (r, slope, slope, square, 0);
     if (now <= accepted * accepted * redundancy_product (r, lambda, lambda, square, 1)) return;
     for (int i = 0; i < rows; i++) z[i] = slope[i] * square[i] + (n > 0 ? now / before * z[i] : 0);
-    redundancy_change (r, z, change);
+    pw_add_JT (r->w, z, r->row_force);
+    redundancy_solve (r, r->coefficient);
+    for (int i = 0; i < rows; i++)
+      change[i] = z[i] - r->coefficient[i]; /* N z; z has entries for redundant rows only */
     double length = now / redundancy_product (r, change, change, square, 1);
     for (int i = 0; i < rows; i++) lambda[i] += length * change[i];
     before = now;

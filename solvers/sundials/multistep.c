@@ -143,25 +143,19 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
   return SUNLS_SUCCESS;
 }
 
-/* Records the patterns of T and of the matrix; there are no values yet. */
-static int newton_lay_out (pw_method_data *d) {
-  bdf_newton *w = &d->newton;
-  pw_tangent *x = &w->tangent;
-  int columns = 3 * d->n + x->rows, size = d->n + x->rows;
-  pw_scatter_begin_record (&x->scatter);
-  newton_fill_T (d);
-  if (pw_scatter_lay_out (&x->scatter, columns) != PW_OK) return PW_RESOURCE;
-  pw_scatter_begin_record (&w->scatter);
-  newton_fill_matrix (w, d->n);
-  return pw_scatter_lay_out (&w->scatter, size);
-}
-
 /* Opens the Newton matrix and attaches it to CVODES. */
 static int newton_open (pw_method_data *d) {
   bdf_newton *w = &d->newton;
   pw_sun *x = &d->sun;
-  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK ||
-      pw_sun_open_solver (x, d->n + w->tangent.rows, &w->scatter, d, newton_solve) != PW_OK)
+  if (pw_tangent_open (&w->tangent, x->run) != PW_OK) return PW_RESOURCE;
+  const int size = d->n + w->tangent.rows;
+  pw_scatter_begin_record (&w->tangent.scatter); /* the patterns of T and of the matrix; there are no values yet */
+  newton_fill_T (d);
+  if (pw_scatter_lay_out (&w->tangent.scatter, 2 * d->n + size) != PW_OK) return PW_RESOURCE;
+  pw_scatter_begin_record (&w->scatter);
+  newton_fill_matrix (w, d->n);
+  if (pw_scatter_lay_out (&w->scatter, size) != PW_OK ||
+      pw_sun_open_solver (x, size, &w->scatter, d, newton_solve) != PW_OK)
     return PW_RESOURCE;
   int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
   return failed ? PW_RESOURCE : PW_OK;
