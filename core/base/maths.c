@@ -17,20 +17,12 @@ void pw_sin_cos (double x, double *sine, double *cosine) {
   }
 }
 
-/* The sine of x + k pi/2 for |x| < PW_SINE_LIMIT, with the bits of pw_sin_cos; one polynomial suffices. */
-static double sine_shifted (double x, uint64_t k) {
-  pw_lanes y, lo;
-  pw_lane_bits quadrant = pw_sine_reduce ((pw_lanes){ x }, &y, &lo) + k;
-  pw_lanes value = quadrant[0] & 1 ? pw_cosine_polynomial (y, lo) : pw_sine_polynomial (y, lo);
-  return pw_sine_value (pw_sine_bits (value) ^ (quadrant >> 1 << 63))[0];
-}
-
 double pw_sin (double x) {
-  return fabs (x) < PW_SINE_LIMIT ? sine_shifted (x, 0) : sin (x);
+  return fabs (x) < PW_SINE_LIMIT ? pw_sine_shifted (x, 0) : sin (x);
 }
 
 double pw_cos (double x) {
-  return fabs (x) < PW_SINE_LIMIT ? sine_shifted (x, 1) : cos (x);
+  return fabs (x) < PW_SINE_LIMIT ? pw_sine_shifted (x, 1) : cos (x);
 }
 
 /* The complete elliptic integral K and Jacobi's amplitude am, which give the exact motion of a pendulum, from the

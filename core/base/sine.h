@@ -83,4 +83,14 @@ static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosin
   *cosine = pw_sine_value (cosine_bits ^ swap ^ ((quadrant + 1) >> 1 << 63));
 }
 
+#ifndef PW_LANES
+/* sin (x + k pi/2) for |x| < PW_SINE_LIMIT, with the bits of pw_sin_cos_lanes; one polynomial suffices. */
+static inline double pw_sine_shifted (double x, uint64_t k) {
+  pw_lanes y, lo;
+  pw_lane_bits quadrant = pw_sine_reduce ((pw_lanes){ x }, &y, &lo) + k;
+  pw_lanes value = quadrant[0] & 1 ? pw_cosine_polynomial (y, lo) : pw_sine_polynomial (y, lo);
+  return pw_sine_value (pw_sine_bits (value) ^ (quadrant >> 1 << 63))[0];
+}
+#endif
+
 #endif

@@ -631,8 +631,10 @@ int pw_processor_lanes (void) {
 }
 
 /* Without -fno-tree-slp-vectorize, gcc 12.2 would use fused multiply-add (see STRICT in the Makefile). */
-#define CODE_OPTIONS "-std=c11", "-ffp-contract=off", "-fPIC", "-shared", "-fno-tree-slp-vectorize"
-#define CODE_LANES CODE_OPTIONS, "-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd"
+#define CODE_OPTIONS                                                                                        \
+  "-std=c11", "-ffp-contract=off", "-fPIC", "-shared", "-fno-tree-slp-vectorize", "-O3", "-fno-math-errno", \
+      "-fno-trapping-math"
+#define CODE_LANES CODE_OPTIONS, "-fopenmp-simd"
 
 /* The compiler's options for generated code, ending with NULL: vector instructions of this processor, no fused
  * multiply-add, so that results have the same bits.  NULL: no code advances this number of runs. */
@@ -641,8 +643,8 @@ static const char *const *code_options (int lanes) {
     int lanes, processor; /* processor: the least pw_processor_lanes for which the options are valid */
     const char *option[16];
   } known[] = {
-    { 0, 4, { CODE_OPTIONS, "-O2", "-mavx2" } },
-    { 0, 1, { CODE_OPTIONS, "-O2" } },
+    { 0, 4, { CODE_OPTIONS, "-mavx2" } },
+    { 0, 1, { CODE_OPTIONS } },
     { 2, 4, { CODE_LANES, "-DPW_LANES=2", "-mavx" } }, /* not -mavx2: functions of libm on 2 numbers (batch.h) */
     { 2, 1, { CODE_LANES, "-DPW_LANES=2" } },
     { 4, 4, { CODE_LANES, "-DPW_LANES=4", "-mavx2" } },

@@ -19,6 +19,7 @@ typedef struct {
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
   char gaps[MOTION_GAPS]; /* pw_motion_gaps of the table or, if a computed reference replaces it, of the model's own */
   char name[300];         /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */
+  double cpu;             /* processor time of a computed one [s]; else 0 */
   int partners;           /* number of other computed solutions, with their distances from this one */
   struct {
     char name[100];
@@ -253,6 +254,7 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
       if (i != best && i != second && candidates[i].finished)
         reference_add_partner (reference, system, &candidates[best], &candidates[i]);
     reference->motion = candidates[best].motion;
+    reference->cpu = candidates[best].row.cpu;
     candidates[best].motion = (pw_motion){ .times = 0 };
     reference_raise_uncertainty (system, reference);
   }
@@ -534,7 +536,8 @@ static void conclusion_print (const pw_compare *compare) {
 
 enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
 #define COMPARE_FEW 3          /* timed runs of a row, at least, unless --repeats is less or they exceed the limit */
-#define COMPARE_ENOUGH 0.5     /* total processor time [s] of a row after which no further run is timed */
+#define COMPARE_ENOUGH 0.1     /* total processor time [s] of a row after which no further run is timed */
+#define COMPARE_HOPELESS 200   /* cost of a run over that of the reference, from which on it is abandoned */
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
 #define COMPARE_DECADE 1.6 /* factor of the cost if a tolerance is divided by ten, of a method of order 5: 10^(1/5) */
@@ -724,6 +727,9 @@ static int compare_begin (pw_study *study, pw_error *error) {
   int status = reference_find (&compare->reference, study, compare->finest_step, error);
   if (status == PW_OK && study->folder) status = reference_write (&compare->reference, study->folder, error);
   if (status != PW_OK) return status;
+  if (study->line.limit == NULL && compare->reference.cpu > 0)
+    study->cpu_limit = fmin (study->cpu_limit, fmax (COMPARE_ENOUGH, COMPARE_HOPELESS * compare->reference.cpu));
+  study->limit.seconds = study->cpu_limit;
   study->run_share = 1 / (compare->repeats + 1);
   const double *largest = compare->reference.uncertainty + MOTION_LARGEST;
   compare->concludes = compare->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
@@ -810,12 +816,14 @@ static const struct poptOption compare_options[] = {
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),
   PW_TEXT_OPTION (pw_compare, step_text, "step-ladder", 0, "FROM:TO",
                   "Step sizes of fixed-step methods [s], halved each time (default 0.1:1e-4)"),
-  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",
-                  "Processor time of a single run; runs expected to take longer are skipped (default 10)"),
+  PW_TEXT_OPTION (
+      pw_cli_line, limit, "limit", 0, "SECONDS",
+      "Processor time of a single run; runs expected to take longer are skipped (default 10, at most 200 times "
+      "that of a computed reference)"),
   PW_TEXT_OPTION (
       pw_compare, repeats_text, "repeats", 0, "N",
       "Timed repetitions of each run, at most 99, of which the median is reported (default 9, or those that "
-      "fit into half a second)"),
+      "fit into a tenth of a second, but 3)"),
   PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N",
                   "Number of methods that run at a time, each on a physical core of its own (default: all cores)"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
