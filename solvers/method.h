@@ -319,6 +319,12 @@ int pw_run_look_ahead (pw_run *r, pw_error *error);
 /* Makes the norm of the accelerations at the state reached the reference level for later ones. */
 void pw_run_set_reference_level (pw_run *r);
 
+/* 1 if the saddle or the method could not be reopened: the run can only be closed.  PW_RESOURCE. */
+int pw_run_has_no_method (const pw_run *r, pw_error *error);
+
+/* Makes rows active that are independent at the state reached. */
+int pw_run_select_rows (pw_run *r, pw_error *error);
+
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_error *error);
 /* Restarts the method if a discontinuity of a signal has been reached. */

@@ -6,16 +6,17 @@
 #include "pinwheel-solvers.h"
 
 #ifndef PW_METHODS /* interactive pages have fewer */
-#define PW_METHODS   \
-  PW_METHOD (rk4)    \
-  PW_METHOD (erk5)   \
-  PW_METHOD (erk8)   \
-  PW_METHOD (adams)  \
-  PW_METHOD (bdf)    \
-  PW_METHOD (ida)    \
-  PW_METHOD (radau)  \
-  PW_METHOD (galpha) \
-  PW_METHOD (leapfrog)
+#define PW_METHODS     \
+  PW_METHOD (rk4)      \
+  PW_METHOD (erk5)     \
+  PW_METHOD (erk8)     \
+  PW_METHOD (adams)    \
+  PW_METHOD (bdf)      \
+  PW_METHOD (ida)      \
+  PW_METHOD (radau)    \
+  PW_METHOD (galpha)   \
+  PW_METHOD (leapfrog) \
+  PW_METHOD (moreau)
 #endif
 
 /* pw_method_parse that also returns the values of the options (room for PW_MAX_OPTIONS numbers, method.h), and also

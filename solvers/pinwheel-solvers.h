@@ -48,13 +48,14 @@ typedef struct {
 
 /* An integrator.  All of Pinwheel's are const tables of this type; for your own, see pinwheel-method.h. */
 struct pw_method {
-  const char *name;                         /* "rk4" */
-  const char *about;                        /* one line, with its source (author, year) */
-  int adaptive;                             /* 1: uses rtol and atol, unless steps=fixed; 0: uses step */
-  int order;                                /* of convergence; 0: variable */
-  const pw_stabilisation *stabilisations;   /* ended by a NULL name; the first is the default */
-  const pw_option *options;                 /* ended by a NULL name */
-  const pw_stabilisation *refused;          /* unsupported ones, `about` is the reason; ended likewise, or NULL */
+  const char *name;                       /* "rk4" */
+  const char *about;                      /* one line, with its source (author, year) */
+  int adaptive;                           /* 1: uses rtol and atol, unless steps=fixed; 0: uses step */
+  int order;                              /* of convergence; 0: variable */
+  const pw_stabilisation *stabilisations; /* ended by a NULL name; the first is the default */
+  const pw_option *options;               /* ended by a NULL name */
+  const pw_stabilisation *refused;        /* unsupported ones, `about` is the reason; ended likewise, or NULL */
+  int locates_no_events; /* 1: of limited reactions, it decides the impulses of each step instead; moreau alone */
   int (*open) (pw_run *r, pw_error *error); /* allocates the data; returns a status, as the following */
   int (*advance) (pw_run *r, double t_end, pw_error *error); /* one step, at most to t_end or a discontinuity */
   int (*at) (pw_run *r, double t, pw_error *error); /* the state in the last step that pw_run_sample requests */
@@ -220,7 +221,8 @@ int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 /* The mode of a constraint equation at the state reached, as of pw_event; 0 without limits. */
 int pw_run_mode (const pw_run *r, int row);
 
-/* The events since the run was opened, in the order of time; valid until it advances. */
+/* The events since the run was opened, in the order of time; valid until it advances.  None with a method that locates
+ * no events. */
 const pw_event *pw_run_events (const pw_run *r, int *count);
 
 /* These belong to the run.  After pw_run_restart, pw_run_initial reports on the state given there. */

@@ -26,6 +26,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "events.h"
 #include "linear.h"
 #include "util.h"
 #include "rank.h"
@@ -62,6 +63,7 @@ static void linear_put (pw_linearisation *x, const double *v) {
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
   int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
   if (status != PW_OK) return status;
+  if (x->r->enforced) pw_fill_given (x->r, x->lambda);
   pw_scatter_begin_fill (&x->tangent.scatter, x->tangent.scatter.value);
   linear_put (x, v);
   return PW_OK;
@@ -821,6 +823,8 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error)
                       : pw_run_annotate_error (r, pw_fail_signal (r->t, error), error);
+  status = pw_events_check_modes (r, r->v, x->lambda, error);
+  if (status != PW_OK) return status;
   l->least = linear_least (x);
   pw_linear_bases (x);
   int jump = linear_jump (x);
@@ -853,9 +857,6 @@ static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *
   pw_linearisation x;
   *l = (pw_linear){ .least = NAN };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  if (r->enforced)
-    return pw_fail (error, PW_INPUT,
-                    "model %s: no linearisation: a reaction, as of a wheel with a grip, is at its limit", r->s->model);
   if (r->s->coords > most) extent = PW_LINEAR_COUNTS;
   pw_statistics before = r->statistics;
   int near_singular = r->near_singular, status = pw_linear_open (&x, r, extent);

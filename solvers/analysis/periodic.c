@@ -221,7 +221,7 @@ static int flow_changed (void *context, const double *c, double rtol, double *va
 
 /* Differentiates the state at the end of the period along x->basis, into x->Phi. */
 static int flow_derivatives (pw_periodic *x, pw_run *r, double end, pw_flow_accuracy accuracy) {
-  const int size = x->size, n = x->n;
+  const int size = x->size, n = x->n, limited = r->s->limited > 0;
   double *zero = calloc (2 * (size_t)size + 2, sizeof *zero), *L = zero + size + 1;
   pw_derivative *derivative = calloc (2 * (size_t)n * (size_t)size + 1, sizeof *derivative);
   const pw_difference_settings d = { .evaluate = flow_changed,
@@ -231,12 +231,21 @@ static int flow_derivatives (pw_periodic *x, pw_run *r, double end, pw_flow_accu
                                      .outputs = 2 * n,
                                      .size = L,
                                      .rtol = r->settings.rtol,
-                                     .neighbours = accuracy == PW_FLOW_MULTIPLIERS ? 4 : 2,
+                                     /* a given step may be longer than a phase between two events */
+                                     .neighbours = accuracy != PW_FLOW_MULTIPLIERS ? 2
+                                                   : limited                       ? 6
+                                                                                   : 4,
                                      .jobs = 1 };
   int status = zero && derivative ? PW_OK : pw_fail_memory (x->s, &x->why);
   for (int c = 0; c < size && zero; c++) L[c] = x->L;
   if (status == PW_OK && size > 0) status = pw_differentiate (&d, derivative, NULL, &x->why);
-  for (int i = 0; i < 2 * n * size && status == PW_OK; i++) x->Phi[i] = derivative[i].value;
+  for (int i = 0; i < 2 * n * size && status == PW_OK; i++) {
+    x->Phi[i] = derivative[i].value;
+    if (derivative[i].type != PW_DERIVATIVE && accuracy == PW_FLOW_MULTIPLIERS) status = PW_RETRY;
+  }
+  if (status == PW_RETRY)
+    pw_fail (&x->why, PW_METHOD, "no multipliers: the state after a period has no derivative with respect to %s",
+             limited ? "the initial one, as if an event were about to appear" : "the initial one");
   free (zero);
   free (derivative);
   return status;
@@ -658,7 +667,7 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
   pw_error ignored = { 0 };
   if (error == NULL) error = &ignored;
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
-  if (pw_check_limits (s, error) != PW_OK || periodic_check_settings (settings, error) != PW_OK) return NULL;
+  if (periodic_check_settings (settings, error) != PW_OK) return NULL;
   pw_periodic *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->settings = *settings, x->n = s->coords;

@@ -127,8 +127,6 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
 
 /* PW_INPUT, with the name, unless these settings of a search for steady or periodic motions are valid. */
 int pw_check_search (double first, double last, int points, pw_error *error);
-/* PW_INPUT if reactions have limits: these searches differentiate the equations of motion. */
-int pw_check_limits (const pw_system *s, pw_error *error);
 /* PW_INPUT unless the parameter is finite; unless the direction is 1 or -1 and the range is not empty. */
 static inline int pw_check_parameter (double parameter, pw_error *error) {
   if (isfinite (parameter)) return PW_OK;

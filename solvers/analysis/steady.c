@@ -116,7 +116,7 @@ const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why
   }
   const pw_system *own = x->own;
   if (own->coords == s->coords && own->rows == s->rows && own->holonomic == s->holonomic && own->bodies == s->bodies)
-    return pw_check_limits (own, why) == PW_OK ? own : NULL;
+    return own;
   pw_fail (why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations", own->model);
   return NULL;
 }
@@ -224,6 +224,12 @@ static int steady_nearest (pw_steady *x, const double *q, const double *v, doubl
 
 /* ---- Residuals ---- */
 
+/* The unit of the residual of an equation: INFINITY if it is not enforced, since its reaction is at a limit. */
+static double steady_row_unit (const pw_steady *x, int i) {
+  const pw_run *r = x->system.run;
+  return r->enforced && !r->enforced[i] ? INFINITY : x->norm[i] * x->L;
+}
+
 /* The residuals g, J v - eta, a - W v of x->system in the state x->q, x->v, at which its accelerations have been
  * evaluated. */
 static void steady_residual (pw_steady *x, double *F) {
@@ -231,11 +237,12 @@ static void steady_residual (pw_steady *x, double *F) {
   pw_workspace *w = x->system.run->w;
   double acceleration = x->T * x->T / x->L;
   pw_evaluate_g (w, F);
-  for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
+  for (int i = 0; i < x->holonomic; i++) F[i] /= steady_row_unit (x, i);
   F += x->holonomic;
   pw_mul_J (w, x->v, F);
   if (x->s->rheonomic) pw_evaluate_eta (w, l->row_scratch);
-  for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->row_scratch[i] : 0)) * x->T / (x->norm[i] * x->L);
+  for (int i = 0; i < x->m; i++)
+    F[i] = (F[i] - (x->s->rheonomic ? l->row_scratch[i] : 0)) * x->T / steady_row_unit (x, i);
   F += x->m;
   memcpy (F, l->a, (size_t)x->n * sizeof *F);
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
@@ -248,10 +255,10 @@ static void steady_change (pw_steady *x, double dw, double *F) {
   int n = x->n;
   double *dq = l->dx, *dv = l->dx + n;
   pw_mul_J (x->system.run->w, dq, l->row_scratch);
-  for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / (x->norm[i] * x->L);
+  for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / steady_row_unit (x, i);
   pw_linear_vary (l);
   pw_mul_J (x->system.run->w, dv, l->row_scratch);
-  for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / (x->norm[i] * x->L);
+  for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / steady_row_unit (x, i);
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
   for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
@@ -453,13 +460,6 @@ int pw_check_search (double first, double last, int points, pw_error *error) {
   return PW_OK;
 }
 
-int pw_check_limits (const pw_system *s, pw_error *error) {
-  if (s->limited == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT,
-                  "model %s: neither steady nor periodic motions are sought where reactions have limits, as by a grip",
-                  s->model);
-}
-
 static int steady_arrays (pw_steady *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), unknowns = n + rates;
   size_t holds = (size_t)x->settings.holds;
@@ -591,8 +591,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
 
 static int steady_check_settings (const pw_system *s, const pw_steady_settings *set, pw_error *error) {
   const int most = 2 * s->coords + PW_HOLD_OF_BODY * s->bodies - 1;
-  if (pw_check_limits (s, error) != PW_OK || pw_check_search (set->first, set->last, set->points, error) != PW_OK)
-    return PW_INPUT;
+  if (pw_check_search (set->first, set->last, set->points, error) != PW_OK) return PW_INPUT;
   if (set->holds < 0 || (set->holds > 0 && set->hold == NULL))
     return pw_fail (error, PW_INPUT, "setting holds = %d: expected the number of entries of `hold`", set->holds);
   for (const pw_initial_value *x = set->hold, *end = x + set->holds; x < end; x++)

@@ -39,6 +39,9 @@
 /* Of multipliers in a step [limits]: the parabolas by which roots are suspected then err by less than the distance of a
  * typical multiplier from its limit (events_longest). */
 #define EVENTS_BEND 0.1
+/* Distance of a multiplier [limits], or of u [units], from the boundary of a mode that is not round-off, nor that of
+ * initial values with 6 digits. */
+#define EVENTS_BOUNDARY 1e-6
 enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
 
 typedef struct pw_events {
@@ -58,11 +61,15 @@ typedef struct pw_events {
   double longest, roughness; /* next adaptive step [s]; the bend of multipliers in the last one over EVENTS_BEND */
   double *memory;            /* of pw_first_crossing */
   double *u, *u_before, *impulse;
+  const unsigned char *origin; /* of initial values: of the run; NULL in a restart */
   double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
   int at_end;     /* 1: the state reached, its multipliers and its J are known */
   int samples;    /* 1: J has been evaluated elsewhere since */
   int pending;    /* 1: modes must be decided at the state reached */
   int fell;       /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
+  int stepping;   /* 1: events are not located; impulses of whole steps are decided (below) */
+  int jumped;     /* 1: there was an impact in the last step */
+  double *mean;   /* multipliers of the last step: its impulses over its length */
 
   /* Of a decision: the equations D, by their number among those with limits. */
   int n, *list;
@@ -77,8 +84,8 @@ static int events_allocate (pw_run *r) {
   const size_t n = (size_t)s->limited, rows = (size_t)s->rows, coords = (size_t)s->coords + 3;
   pw_events *x = r->events = pw_arena_alloc (&r->arena, sizeof *x);
   if (x == NULL) return PW_RESOURCE;
-  double **const number[] = { &x->force_unit, &x->unit, &x->u, &x->u_before, &x->impulse,
-                              &x->offset,     &x->b,    &x->x, &x->lo,       &x->hi };
+  double **const number[] = { &x->force_unit, &x->unit, &x->u,  &x->u_before, &x->impulse, &x->offset,
+                              &x->b,          &x->x,    &x->lo, &x->hi,       &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
   signed char **const mode[] = { &x->mode, &x->before, &x->trial };
   unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked };
@@ -129,9 +136,9 @@ static void events_apply (pw_run *r) {
     off |= !x->enforced[i];
   }
   for (int i = 0; i < x->count; i++) {
-    if (x->mode[i] == 0) continue;
+    if (x->mode[i] == 0 && !x->stepping) continue;
     x->enforced[x->row[i]] = 0;
-    r->reaction[x->row[i]] = -events_given (x, i);
+    r->reaction[x->row[i]] = -(x->stepping ? x->mean[i] : events_given (x, i));
     off = 1;
   }
   r->active = r->enforced = off ? x->enforced : NULL;
@@ -219,6 +226,23 @@ static int events_trigger (pw_run *r, const double *value) {
 
 /* ---- Decisions ---- */
 
+/* Evaluates A with the saddle of the other equations, which must be factorised. */
+static void decision_matrix (pw_run *r, pw_saddle *saddle) {
+  pw_events *x = r->events;
+  const pw_system *s = r->s;
+  double *Ja = x->lambda + s->rows;
+  for (int k = 0; k < x->n; k++) {
+    memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
+    memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
+    x->gamma[x->row[x->list[k]]] = 1;
+    pw_add_JT (r->w, x->gamma, x->f);
+    memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
+    pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
+    pw_mul_J (r->w, x->a, Ja);
+    for (int i = 0; i < x->n; i++) x->A[i * x->n + k] = Ja[x->row[x->list[i]]];
+  }
+}
+
 /* The saddle without the equations D (impact: without all that have limits), A, and b: of accelerations; of velocities
  * in an impact.  NULL on errors. */
 static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
@@ -243,21 +267,12 @@ static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
   double *Ja = x->lambda + s->rows;
   pw_mul_J (r->w, x->a, Ja);
   for (int k = 0; k < x->n; k++) x->b[k] = Ja[x->row[x->list[k]]] - x->gamma[x->row[x->list[k]]];
-  for (int k = 0; k < x->n; k++) {
-    memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
-    memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
-    x->gamma[x->row[x->list[k]]] = 1;
-    pw_add_JT (r->w, x->gamma, x->f);
-    memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
-    pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
-    pw_mul_J (r->w, x->a, Ja);
-    for (int i = 0; i < x->n; i++) x->A[i * x->n + k] = Ja[x->row[x->list[i]]];
-  }
+  decision_matrix (r, saddle);
   return saddle;
 }
 
-/* Adds to the velocities those of the impulses -x on D; impulses of the other equations in x->lambda. */
-static int decision_push (pw_run *r, pw_saddle *saddle) {
+/* Adds to v the velocities of the impulses -x on D; impulses of the other equations in x->lambda. */
+static void decision_push (pw_run *r, pw_saddle *saddle, double *v) {
   pw_events *x = r->events;
   const pw_system *s = r->s;
   memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
@@ -266,8 +281,7 @@ static int decision_push (pw_run *r, pw_saddle *saddle) {
   pw_add_JT (r->w, x->gamma, x->f);
   memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
   pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
-  for (int j = 0; j < s->coords; j++) r->v[j] += x->a[j];
-  return pw_update_velocities (r->w, r->v);
+  for (int j = 0; j < s->coords; j++) v[j] += x->a[j];
 }
 
 /* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  Of equations that depend
@@ -385,6 +399,16 @@ static void impact_ledger (pw_run *r) {
   }
 }
 
+/* After decision_push: u from the velocities v, and the ledger. */
+static void impact_end (pw_run *r, const double *v) {
+  pw_events *x = r->events;
+  const size_t bytes = (size_t)r->s->rows * sizeof *x->gamma;
+  memcpy (x->gamma, x->lambda, bytes);
+  events_u (r, v, 0, x->u); /* uses x->lambda */
+  memcpy (x->lambda, x->gamma, bytes);
+  impact_ledger (r);
+}
+
 /* 1 if a holonomic equation does not hold because g has left 0. */
 static int events_open (const pw_run *r, int i, double g) {
   const pw_events *x = r->events;
@@ -418,14 +442,10 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
     pw_saddle_close (saddle);
     return status;
   }
-  const int failed = decision_push (r, saddle) != PW_OK;
+  decision_push (r, saddle, r->v);
   pw_saddle_close (saddle);
-  if (failed) return pw_fail_signal (r->t, error);
-  const size_t bytes = (size_t)r->s->rows * sizeof *x->gamma;
-  memcpy (x->gamma, x->lambda, bytes);
-  events_u (r, r->v, 0, x->u); /* uses x->lambda */
-  memcpy (x->lambda, x->gamma, bytes);
-  impact_ledger (r);
+  if (pw_update_velocities (r->w, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  impact_end (r, r->v);
   for (int k = 0; k < x->n; k++) {
     x->impulse[x->list[k]] = -x->x[k];
     x->rests[x->list[k]] = fabs (x->u[x->list[k]]) <= EVENTS_SMALL * x->unit[x->list[k]];
@@ -452,28 +472,38 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
   events_apply (r); /* forces of those outside D */
 }
 
+/* decision_pivot, where one that slides may have a smaller multiplier than one that holds.  x are `unit` times what
+ * multipliers exceed `known` by (NULL: 0). */
+static int decide_sliding (pw_events *x, double unit, const double *known) {
+  for (int again = 1; again;) {
+    if (decision_pivot (x) != PW_OK) return PW_RETRY;
+    again = 0;
+    for (int k = 0; k < x->n; k++) {
+      const int i = x->list[k];
+      const double from = known ? known[i] : 0, *sliding = x->limit[i].sliding;
+      const double lo = unit * (sliding[0] - from), hi = unit * (sliding[1] - from);
+      if (x->trial[k] > 0 && x->hi[k] > hi) x->hi[k] = hi, again = 1;
+      if (x->trial[k] < 0 && x->lo[k] < lo) x->lo[k] = lo, again = 1;
+    }
+  }
+  return PW_OK;
+}
+
 /* Decides the modes of D.  Their u becomes 0 exactly. */
 static int decide_modes (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   pw_saddle *saddle = x->n > 0 ? decision_open (r, 0, error) : NULL;
-  int status = PW_OK, again = saddle != NULL;
-  while (again && status == PW_OK) { /* one that slides may have a smaller multiplier than one that holds */
-    status = decision_pivot (x);
-    again = 0;
-    for (int k = 0; k < x->n && status == PW_OK; k++) {
-      const double *sliding = x->limit[x->list[k]].sliding;
-      if (x->trial[k] > 0 && x->hi[k] > sliding[1]) x->hi[k] = sliding[1], again = 1;
-      if (x->trial[k] < 0 && x->lo[k] < sliding[0]) x->lo[k] = sliding[0], again = 1;
-    }
-  }
+  int status = saddle ? decide_sliding (x, 1, NULL) : PW_OK;
   if (x->n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, error);
   for (int k = 0; k < x->n && status == PW_OK; k++) {
     x->mode[x->list[k]] = x->trial[k];
     x->trial[k] = 0, x->b[k] = x->u[x->list[k]];
   }
-  if (x->n > 0 && status == PW_OK)
-    status =
-        decision_solve (x, 1) == PW_OK && decision_push (r, saddle) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
+  if (x->n > 0 && status == PW_OK) {
+    (void)decision_solve (x, 1);
+    decision_push (r, saddle, r->v);
+    if (pw_update_velocities (r->w, r->v) != PW_OK) status = pw_fail_signal (r->t, error);
+  }
   pw_saddle_close (saddle);
   return status;
 }
@@ -726,7 +756,7 @@ static int events_moved (const pw_run *r) {
 static int events_consistent (pw_run *r, pw_error *error) {
   events_apply (r);
   memcpy (r->q, r->q_at, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
-  return pw_run_make_consistent (r, r->origin, error);
+  return pw_run_make_consistent (r, r->events->origin, error);
 }
 
 /* 1 if the initial velocities do not satisfy an equation. */
@@ -778,7 +808,7 @@ int pw_events_open (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   for (int i = 0; i < s->rows; i++)
     if (pw_is_limited (s, i) && pw_can_hold (&s->limit[i])) x->row[x->count] = i, x->limit[x->count++] = s->limit[i];
-  x->start_t = x->previous_t = NAN;
+  x->start_t = x->previous_t = NAN, x->origin = r->origin;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_initial (r);
   memcpy (r->q_at, r->q, 2 * ((size_t)s->coords + 3) * sizeof *r->q);
@@ -806,6 +836,155 @@ int pw_run_mode (const pw_run *r, int row) {
   return 0;
 }
 
+int pw_events_restart (pw_run *r, double *energy, pw_error *error) {
+  pw_events *x = r->events;
+  x->start_t = x->previous_t = NAN, x->roughness = 0, x->origin = NULL;
+  x->stepping = x->pending = x->fell = 0;
+  memset (x->triggered, 0, (size_t)x->count);
+  for (int i = 0; i < x->count; i++) x->limit[i].initially_slides = !pw_is_one_sided (&x->limit[i]);
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  events_initial (r);
+  memcpy (r->q_at, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
+  int status = events_consistent (r, error);
+  if (status == PW_OK) status = events_initial_friction (r, error);
+  if (status != PW_OK) return status;
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  *energy = pw_energy (r, r->v);
+  status = pw_events_begin (r, error);
+  return status == PW_OK ? pw_run_renew (r, error) : status;
+}
+
+int pw_events_check_modes (pw_run *r, const double *v, const double *lambda, pw_error *error) {
+  pw_events *x = r->events;
+  if (x == NULL) return PW_OK;
+  events_u (r, v, 1, x->u);
+  for (int i = 0; i < x->count; i++) {
+    const char *name = PW_NAME (pw_system_row_name, r->s, x->row[i]);
+    const pw_bounds *limit = &x->limit[i];
+    const double y = lambda[x->row[i]], u = x->mode[i] * x->u[i], least = y - limit->least, most = limit->most - y;
+    const double unit = x->mode[i] ? x->unit[i] : x->force_unit[i], margin = x->mode[i] ? u : fmin (least, most);
+    const int changes = margin > -EVENTS_BOUNDARY * unit;
+    if (margin > EVENTS_BOUNDARY * unit) continue;
+    if (x->mode[i] == 0)
+      return pw_fail (error, PW_METHOD, "t = %.6g s: %s is %s a limit of its reaction: %.9g, limit %.9g", r->t, name,
+                      changes ? "at" : "beyond", -y, -(least < most ? limit->least : limit->most));
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s %s: its %s is %.3g", r->t, name,
+                    changes ? "begins or ceases to hold" : "is on the wrong side of its limit",
+                    x->row[i] < r->s->holonomic ? "distance" : "velocity", u);
+  }
+  return PW_OK;
+}
+
+/* ---- Impulses of a step (moreau.c): no event is located ----
+ *
+ * None of the equations is enforced by others: all have given multipliers, in x->mean.  During a step these are
+ * predicted ones; afterwards, with the impulses that correct them at its end, the mean of the step.  Mode 0: u is 0 at
+ * the end of the step. */
+
+int pw_impulses_open (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  if (x == NULL || x->stepping) return PW_OK;
+  for (int i = 0; i < x->count; i++) x->mean[i] = x->mode[i] ? events_given (x, i) : r->lambda[x->row[i]];
+  x->stepping = 1;
+  r->event_count = 0;
+  events_apply (r);
+  const int status = pw_run_open_saddle (r, error);
+  return status == PW_OK ? pw_run_evaluate (r, error) : status;
+}
+
+int pw_impulses_predict (pw_run *r) {
+  pw_events *x = r->events;
+  int changed = 0;
+  for (int i = 0; x && i < x->count; i++) {
+    const int one_sided = pw_is_one_sided (&x->limit[i]);
+    const double next = x->mode[i] ? events_given (x, i) : x->jumped && one_sided ? 0 : x->mean[i];
+    changed |= next != x->mean[i];
+    x->mean[i] = next;
+  }
+  if (changed) events_apply (r);
+  return changed;
+}
+
+/* Lists D, with the limits of what impulses add to those of the predicted multipliers: equations that held at the
+ * beginning of the step, those of velocities, and those of positions whose g has left its side. */
+static void impulses_list (pw_run *r, double h, const double *g) {
+  pw_events *x = r->events;
+  x->n = x->jumped = 0;
+  for (int i = 0; i < x->count; i++) {
+    const int side = events_off (x, i, 0), is_position = x->row[i] < r->s->holonomic;
+    const double before = side * x->u_before[i] / x->unit[i];
+    const int one_sided = pw_is_one_sided (&x->limit[i]);
+    x->rests[i] = 1;
+    if (is_position && x->mode[i] && side * g[i] > EVENTS_SMALL * x->unit[i]) continue;
+    if (one_sided && x->mode[i] && before < -EVENTS_SMALL) {
+      x->jumped = 1;
+      x->rests[i] = before > -EVENTS_SLOW || x->limit[i].restitution == 0;
+    }
+    x->lo[x->n] = h * (x->limit[i].least - x->mean[i]), x->hi[x->n] = h * (x->limit[i].most - x->mean[i]);
+    x->b[x->n] = x->u[i] + (x->rests[i] ? 0 : x->limit[i].restitution * x->u_before[i]);
+    x->trial[x->n] = x->mode[i];
+    x->list[x->n++] = i;
+  }
+}
+
+int pw_impulses_solve (pw_run *r, pw_projector *p, double h, double t, const double *q, double *v, double *before,
+                       pw_error *error) {
+  pw_events *x = r->events;
+  memcpy (before, r->v, (size_t)r->s->coords * sizeof *before);
+  if (pw_evaluate_J_at (r->w, t, q, before) != PW_OK) return pw_fail_signal (t, error);
+  if (pw_project_velocities (p, r, before) != PW_OK) return pw_fail_singular (r, t, error);
+  events_u (r, before, 1, x->now);
+  events_u (r, before, 0, x->u_before);
+  if (pw_update_velocities (r->w, v) != PW_OK) return pw_fail_signal (t, error);
+  events_u (r, v, 0, x->u);
+  impulses_list (r, h, x->now);
+  decision_matrix (r, r->saddle);
+  if (decide_sliding (x, h, x->mean) != PW_OK) return decision_fail (r, r->saddle, error);
+  decision_push (r, r->saddle, v);
+  if (pw_update_velocities (r->w, v) != PW_OK) return pw_fail_signal (t, error);
+  impact_end (r, v);
+  for (int i = 0; i < x->count; i++) x->mode[i] = x->mode[i] ? x->mode[i] : events_off (x, i, 0);
+  for (int k = 0; k < x->n; k++) {
+    const int i = x->list[k];
+    x->mean[i] += x->x[k] / h;
+    x->mode[i] = x->rests[i] ? x->trial[k] : events_off (x, i, 0);
+  }
+  events_apply (r);
+  return PW_OK;
+}
+
+/* Lists the equations of positions that must be corrected by dq: those that hold, and those that are violated.
+ * Returns 1 if one of them is violated. */
+static int impulses_violated (pw_run *r, const double *g) {
+  pw_events *x = r->events;
+  int any = x->n = 0;
+  for (int i = 0; i < x->count && x->row[i] < r->s->holonomic; i++) {
+    const int side = events_off (x, i, 0), holds = x->mode[i] == 0;
+    const double off = (holds ? -fabs (g[i]) : side * g[i]) / x->unit[i];
+    if (!holds && !(off < -EVENTS_SMALL)) continue;
+    any |= off < -EVENTS_SMALL;
+    x->lo[x->n] = holds || side > 0 ? -INFINITY : 0, x->hi[x->n] = holds || side < 0 ? INFINITY : 0;
+    x->trial[x->n] = 0, x->b[x->n] = g[i];
+    x->list[x->n++] = i;
+  }
+  return any;
+}
+
+int pw_impulses_project (pw_run *r, pw_projector *p, double t, double *q, const double *v) {
+  pw_events *x = r->events;
+  for (int pass = 0; pass < 3 * EVENTS_PASSES; pass++) {
+    int status = pw_project_positions (p, r, t, q, v);
+    if (status != PW_OK || x == NULL) return status;
+    events_u (r, v, 1, x->now);
+    if (!impulses_violated (r, x->now)) return PW_OK;
+    if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
+    decision_matrix (r, p->position);
+    if (decision_pivot (x) != PW_OK) return PW_RETRY;
+    decision_push (r, p->position, q);
+  }
+  return PW_RETRY;
+}
+
 void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_events *x = r->events;
   if (x == NULL) return;
@@ -814,6 +993,9 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
   pw_archive_bytes (a, &x->pending, sizeof x->pending);
   pw_archive_bytes (a, &x->fell, sizeof x->fell);
+  pw_archive_bytes (a, x->mean, (size_t)x->count * sizeof *x->mean);
+  pw_archive_bytes (a, &x->jumped, sizeof x->jumped);
+  pw_archive_bytes (a, &x->stepping, sizeof x->stepping);
   pw_archive_count (a, &r->event_count);
   for (long i = 0; i < r->event_count && !a->failed; i++) {
     a->failed |= a->loading && pw_grow (&r->event, (size_t)i, &r->event_room, sizeof *r->event) != PW_OK;

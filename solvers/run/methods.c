@@ -54,7 +54,7 @@ static int methods_integrator (const char *name, const pw_method *const *own, co
       pw_nearest_try (&near, list[l][i]->name);
       if (strcmp (list[l][i]->name, name) != 0) continue;
       *method = list[l][i];
-      const char *lack = methods_lack (*method);
+      const char *lack = l > 0 && (*method)->locates_no_events ? "events cannot be left to it" : methods_lack (*method);
       return *lack ? pw_fail (error, PW_INPUT, "integrator %s: %s", name, lack) : PW_OK;
     }
   return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near));

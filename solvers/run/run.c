@@ -111,8 +111,7 @@ int pw_run_renew (pw_run *r, pw_error *error) {
   return status == PW_OK ? opened : status;
 }
 
-/* 1 if the saddle or the method could not be reopened: the run can only be closed. */
-static int run_has_no_method (const pw_run *r, pw_error *error) {
+int pw_run_has_no_method (const pw_run *r, pw_error *error) {
   if (r->data) return 0;
   pw_fail (error, PW_RESOURCE, "model %s: t = %.6g s: the method could not be reopened", r->s->model, r->t);
   return 1;
@@ -120,7 +119,7 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
 
 int pw_run_settle (pw_run *r, pw_error *error) {
   if (!r->interrupted) return PW_OK;
-  if (run_has_no_method (r, error)) return PW_RESOURCE;
+  if (pw_run_has_no_method (r, error)) return PW_RESOURCE;
   const int status = run_restart_method (r, error);
   if (status == PW_OK) r->interrupted = 0;
   return status;
@@ -171,7 +170,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   double before = r->t;
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
-  if (run_has_no_method (r, error)) return PW_RESOURCE;
+  if (pw_run_has_no_method (r, error)) return PW_RESOURCE;
   r->stopped = 0;
   status = pw_run_check_limits (r, error);
   if (status == PW_METHOD) return pw_dead_point_explain (r, error);
@@ -221,7 +220,7 @@ static void run_fill_energies (pw_run *r, pw_sample *sample) {
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   pw_residuals now;
   if (pw_require (r, "a run", error) != PW_OK || pw_require (sample, "a sample", error) != PW_OK) return PW_INPUT;
-  if (run_has_no_method (r, error)) return PW_RESOURCE;
+  if (pw_run_has_no_method (r, error)) return PW_RESOURCE;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->stopped = 0;
   if (t < r->t && pw_run_stop_requested (r)) return PW_STOPPED;
@@ -241,116 +240,11 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Restart ---- */
-
-/* Checks given positions or velocities x, whose states begin at `first`; NULL: none are given. */
-static int run_check_given (const pw_run *r, const double *x, int first, pw_error *error) {
-  for (int j = 0, n = r->s->coords; x && j < n; j++)
-    if (!(fabs (x[j]) < r->thresholds.extreme))
-      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
-                      PW_NAME (pw_system_state_name, r->s, first + j), x[j], r->thresholds.extreme);
-  return PW_OK;
-}
-
-/* Makes (q, v) the state reached; moves the previous one to the sample arrays and the values given before to
- * r->given_before.  q and v may be in the sample arrays; NULL: unchanged. */
-static void run_exchange (pw_run *r, const double *q, const double *v) {
-  size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
-  double *given = r->scratch;
-  memcpy (given, q ? q : r->q, bytes);
-  memcpy (given + n, v ? v : r->v, bytes);
-  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
-  memcpy (r->given_before, r->q_given, 2 * (n + 3) * sizeof *q);
-  memcpy (r->q, given, bytes);
-  memcpy (r->v, given + n, bytes);
-}
-
-/* Makes rows active that are independent at the state reached. */
-static int run_select_rows (pw_run *r, pw_error *error) {
+int pw_run_select_rows (pw_run *r, pw_error *error) {
   if (r->redundant == 0) return PW_OK;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   run_measure_independence (r);
   return run_reselect (r, error);
-}
-
-static int run_energy (pw_run *r, double *energy, pw_error *error) {
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  *energy = pw_energy (r, r->v);
-  return PW_OK;
-}
-
-/* Continues from r->q and r->v, made consistent; *energy: that of the state reached. */
-static int run_continue_at (pw_run *r, double *energy, pw_error *error) {
-  r->near_singular = 0;
-  r->watchdog.singular_ahead = 1;
-  int status = run_select_rows (r, error);
-  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
-  if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK) status = run_energy (r, energy, error);
-  if (status != PW_OK) return status;
-  status = r->method->restart (r, error);
-  r->interrupted = status != PW_OK; /* then the method is restarted before the next step */
-  return status;
-}
-
-/* A change of energy by the caller is not an error of the method: it is added to the initial energy.  The caller's
- * functions may return other values and breakpoints than before. */
-int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
-  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  double before = 0, after = 0;
-  if (run_has_no_method (r, error)) return PW_RESOURCE;
-  if (r->events)
-    return pw_fail (error, PW_INPUT, "model %s: a run whose reactions have limits, as by a grip, cannot be restarted",
-                    r->s->model);
-  if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
-    return PW_INPUT;
-  r->w->failed = NULL;
-  r->interrupted |= r->t >= r->breakpoint; /* and remains so if the restart is refused */
-  int status = run_energy (r, &before, error);
-  if (status == PW_OK) status = pw_run_look_ahead (r, error);
-  if (status != PW_OK) return pw_run_annotate_error (r, status, error);
-  const double reselect_below = r->reselect_below;
-  const pw_initial_report initial = r->initial;
-  r->w->t_signal = NAN;
-  run_exchange (r, q, v);
-  r->predicted = 0;
-  status = run_continue_at (r, &after, error);
-  if (status == PW_OK) {
-    r->moved_from = r->t;
-    pw_run_count_moved (r);
-    pw_watchdog_begin (r);
-    if (!r->near_singular)
-      pw_run_set_reference_level (r); /* accelerations near a singular configuration are no reference */
-    r->energy0 += after - before;
-    return PW_OK;
-  }
-  pw_run_annotate_error (r, status, error);
-  memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
-  memcpy (r->q_given, r->given_before, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
-  r->reselect_below = reselect_below, r->initial = initial;
-  if (run_select_rows (r, NULL) == PW_OK && pw_run_evaluate (r, NULL) == PW_OK && r->redundant) pw_watchdog_begin (r);
-  r->interrupted |= r->redundant > 0; /* run_select_rows may have opened the method at the refused state */
-  return status;
-}
-
-/* A force changes accelerations alone, so that the method is restarted before the next step, as at a breakpoint. */
-int pw_run_set_input (pw_run *r, int signal, double value, pw_error *error) {
-  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  pw_source *x = signal >= 0 && signal < r->s->sources ? &r->w->source[signal] : NULL;
-  if (x == NULL || x->signal.type != PW_HARMONIC)
-    return pw_fail (error, PW_INPUT, "model %s: %s: expected a harmonic signal, whose place the value takes",
-                    r->s->model, x ? PW_NAME (pw_system_signal_name, r->s, signal) : "an input that does not exist");
-  if (!(fabs (value) < r->thresholds.extreme))
-    return pw_fail (error, PW_INPUT, "model %s: input %s = %g: expected a magnitude below %g", r->s->model,
-                    PW_NAME (pw_system_signal_name, r->s, signal), value, r->thresholds.extreme);
-  const pw_harmonic before = x->signal.harmonic;
-  if (before.amplitude == 0 && before.offset == value) return PW_OK;
-  x->signal.harmonic = (pw_harmonic){ .offset = value };
-  r->w->t_signal = NAN;
-  r->interrupted |= x->of_force;
-  const int status = x->of_force ? PW_OK : pw_run_restart (r, NULL, NULL, error);
-  if (status != PW_OK) x->signal.harmonic = before, r->w->t_signal = NAN;
-  return status;
 }
 
 int pw_run_redundant (const pw_run *r) {

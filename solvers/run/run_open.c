@@ -1,4 +1,4 @@
-/* Opening a run: settings, consistent initial state, accelerations there, method.  Checkpoints. */
+/* Opening a run: settings, consistent initial state, accelerations there, method.  Restarts, checkpoints. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -226,10 +226,15 @@ static unsigned long long checkpoint_identity (const pw_run *r) {
 
 /* ---- Opening ---- */
 
+/* The function that makes a step, without regard to signals. */
+static int (*run_step (const pw_run *r)) (pw_run *r, double t_end, pw_error *error) {
+  return r->events && !r->method->locates_no_events ? pw_events_advance : r->method->advance;
+}
+
 /* A step in which signals, events and conditions are watched. */
 static int run_watched_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->resolution) t_end = fmin (t_end, pw_resolution_end (r));
-  return (r->events ? pw_events_advance : r->method->advance) (r, t_end, error);
+  return run_step (r) (r, t_end, error);
 }
 
 static int run_watch_steps (pw_run *r, pw_error *error) {
@@ -264,7 +269,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_ledger_begin (r);
   status = pw_events_begin (r, error); /* velocities may jump */
   if (r->events && status == PW_OK) r->w->scale.time = run_time_scale (r);
-  r->advance = r->events ? pw_events_advance : r->method->advance;
+  r->advance = run_step (r);
   if (status != PW_OK) return status;
   run_absolute_tolerances (r);
   pw_run_count_moved (r);
@@ -307,6 +312,126 @@ pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *
 pw_run *pw_run_open_inconsistent (const pw_system *s, const char *method, const pw_settings *settings,
                                   pw_error *error) {
   return run_new (s, method, settings, 1, error);
+}
+
+/* ---- Restart ---- */
+
+/* Checks given positions or velocities x, whose states begin at `first`; NULL: none are given. */
+static int restart_check (const pw_run *r, const double *x, int first, pw_error *error) {
+  for (int j = 0, n = r->s->coords; x && j < n; j++)
+    if (!(fabs (x[j]) < r->thresholds.extreme))
+      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
+                      PW_NAME (pw_system_state_name, r->s, first + j), x[j], r->thresholds.extreme);
+  return PW_OK;
+}
+
+/* Makes (q, v) the state reached; moves the previous one to the sample arrays and the values given before to
+ * r->given_before.  q and v may be in the sample arrays; NULL: unchanged. */
+static void restart_exchange (pw_run *r, const double *q, const double *v) {
+  size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
+  double *given = r->scratch;
+  memcpy (given, q ? q : r->q, bytes);
+  memcpy (given + n, v ? v : r->v, bytes);
+  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
+  memcpy (r->given_before, r->q_given, 2 * (n + 3) * sizeof *q);
+  memcpy (r->q, given, bytes);
+  memcpy (r->v, given + n, bytes);
+}
+
+static int restart_energy (pw_run *r, double *energy, pw_error *error) {
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  *energy = pw_energy (r, r->v);
+  return PW_OK;
+}
+
+/* Continues from r->q and r->v, made consistent; *energy: that of the state reached. */
+static int restart_continue (pw_run *r, double *energy, pw_error *error) {
+  r->near_singular = 0;
+  r->watchdog.singular_ahead = 1;
+  if (r->events) return pw_events_restart (r, energy, error);
+  int status = pw_run_select_rows (r, error);
+  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
+  if (status == PW_OK) status = restart_energy (r, energy, error);
+  if (status != PW_OK) return status;
+  status = r->method->restart (r, error);
+  r->interrupted = status != PW_OK; /* then the method is restarted before the next step */
+  return status;
+}
+
+/* Of a run with events: saves the state reached, ledger and modes, or makes the saved ones those of the run. */
+static void restart_keep (pw_run *r, pw_archive *a) {
+  if (r->events == NULL) return;
+  pw_archive_bytes (a, r->q, pw_state_length (r->s) * sizeof *r->q);
+  pw_archive_bytes (a, r->ledger, (size_t)r->entries * sizeof *r->ledger);
+  pw_events_serialise (r, a);
+}
+
+/* A change of energy by the caller is not an error of the method: it is added to the initial energy.  The caller's
+ * functions may return other values and breakpoints than before. */
+int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
+  double before = 0, after = 0;
+  if (pw_run_has_no_method (r, error)) return PW_RESOURCE;
+  if (restart_check (r, q, 0, error) != PW_OK || restart_check (r, v, r->s->coords, error) != PW_OK) return PW_INPUT;
+  r->w->failed = NULL;
+  r->interrupted |= r->t >= r->breakpoint; /* and remains so if the restart is refused */
+  int status = restart_energy (r, &before, error);
+  if (status == PW_OK) status = pw_run_look_ahead (r, error);
+  if (status != PW_OK) return pw_run_annotate_error (r, status, error);
+  const double reselect_below = r->reselect_below;
+  const pw_initial_report initial = r->initial;
+  pw_archive kept = { .at = NULL };
+  restart_keep (r, &kept);
+  if (kept.failed) return pw_fail_memory (r->s, error);
+  r->w->t_signal = NAN;
+  restart_exchange (r, q, v);
+  r->predicted = 0;
+  status = restart_continue (r, &after, error);
+  if (status == PW_OK) {
+    r->moved_from = r->t;
+    pw_run_count_moved (r);
+    pw_watchdog_begin (r);
+    if (!r->near_singular)
+      pw_run_set_reference_level (r); /* accelerations near a singular configuration are no reference */
+    r->energy0 += after - before;
+    pw_archive_free (&kept);
+    return PW_OK;
+  }
+  pw_run_annotate_error (r, status, error);
+  memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
+  if (r->events) {
+    pw_archive from = { .at = kept.at, .size = kept.used, .loading = 1 };
+    restart_keep (r, &from);
+    pw_archive_free (&kept);
+    if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK || pw_run_renew (r, NULL) != PW_OK) r->interrupted = 1;
+  }
+  memcpy (r->q_given, r->given_before, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
+  r->reselect_below = reselect_below, r->initial = initial;
+  if (pw_run_select_rows (r, NULL) == PW_OK && pw_run_evaluate (r, NULL) == PW_OK && r->redundant)
+    pw_watchdog_begin (r);
+  r->interrupted |= r->redundant > 0; /* pw_run_select_rows may have opened the method at the refused state */
+  return status;
+}
+
+/* A force changes accelerations alone, so that the method is restarted before the next step, as at a breakpoint. */
+int pw_run_set_input (pw_run *r, int signal, double value, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
+  pw_source *x = signal >= 0 && signal < r->s->sources ? &r->w->source[signal] : NULL;
+  if (x == NULL || x->signal.type != PW_HARMONIC)
+    return pw_fail (error, PW_INPUT, "model %s: %s: expected a harmonic signal, whose place the value takes",
+                    r->s->model, x ? PW_NAME (pw_system_signal_name, r->s, signal) : "an input that does not exist");
+  if (!(fabs (value) < r->thresholds.extreme))
+    return pw_fail (error, PW_INPUT, "model %s: input %s = %g: expected a magnitude below %g", r->s->model,
+                    PW_NAME (pw_system_signal_name, r->s, signal), value, r->thresholds.extreme);
+  const pw_harmonic before = x->signal.harmonic;
+  if (before.amplitude == 0 && before.offset == value) return PW_OK;
+  x->signal.harmonic = (pw_harmonic){ .offset = value };
+  r->w->t_signal = NAN;
+  r->interrupted |= x->of_force;
+  const int status = x->of_force ? PW_OK : pw_run_restart (r, NULL, NULL, error);
+  if (status != PW_OK) x->signal.harmonic = before, r->w->t_signal = NAN;
+  return status;
 }
 
 /* Checkpoints: the state of a run as bytes.

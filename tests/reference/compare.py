@@ -18,8 +18,8 @@ import initial
 from mechanisms import SPAN, random_mechanism
 from simulator import Failure, Mechanism
 
-ORDER = {"rk4": 4, "galpha": 2, "leapfrog": 2}  # of the methods with fixed steps
-STEP = {"rk4": 0.005, "galpha": 0.002, "leapfrog": 0.002}  # [s]
+ORDER = {"rk4": 4, "galpha": 2, "leapfrog": 2, "moreau": 2}  # of the methods with fixed steps
+STEP = {"rk4": 0.005, "galpha": 0.002, "leapfrog": 0.002, "moreau": 0.002}  # [s]
 RTOL = dict.fromkeys(("erk5", "erk8", "adams", "bdf", "ida", "radau"), 1e-9)
 
 FAILURES = 0.002  # largest fraction of runs that may fail: these mechanisms are neither stiff nor singular

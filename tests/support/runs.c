@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
+#include "pinwheel-files.h"
 #include "runs.h"
 
 pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings) {
@@ -15,6 +16,25 @@ pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings
 void runs_close (pw_run *r, pw_system *s) {
   pw_run_close (r);
   pw_system_free (s);
+}
+
+pw_system *runs_scene (const char *scene, const char *sets) {
+  pw_error error = { 0 };
+  char path[100], name[20];
+  double value;
+  int used;
+  snprintf (path, sizeof path, "tests/models/events-%s.yaml", scene);
+  pw_file *f = pw_file_open (path, &error);
+  pw_model *m = f ? pw_file_model (f, &error) : NULL;
+  check_ok (error.status, &error);
+  for (; sscanf (sets, " %19[^=]=%lf%n", name, &value, &used) == 2; sets += used)
+    check_ok (pw_model_set (m, name, value, &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
+  pw_system *s = pw_system_compile (m, &error);
+  check_ok (error.status, &error);
+  pw_model_free (m);
+  pw_file_close (f);
+  return s;
 }
 
 const pw_method *runs_method (int i, char name[40]) {

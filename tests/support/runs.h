@@ -4,6 +4,9 @@
 
 #include "pinwheel-analysis.h"
 
+/* The system of tests/models/events-SCENE.yaml with parameters "NAME=VALUE NAME=VALUE". */
+pw_system *runs_scene (const char *scene, const char *sets);
+
 pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings);
 
 /* Closes a run and frees its system. */

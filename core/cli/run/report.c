@@ -229,7 +229,12 @@ static void report_errors (const pw_reference_error *errors, const char *gaps, i
 /* The last events; of a scene without limits nothing. */
 static void report_events (const pw_system *system, const pw_summary *summary) {
   const int first = summary->events > REPORT_EVENTS ? summary->events - REPORT_EVENTS : 0;
+  const pw_method *method;
   if (pw_system_limited (system) == 0) return;
+  if (pw_method_parse (summary->method, &method, NULL, NULL) == PW_OK && method->locates_no_events) {
+    pw_cli_print (stdout, "  %s locates no events: reactions with limits are means over steps\n", method->name);
+    return;
+  }
   pw_cli_print (stdout, "  %s%s\n", PW_COUNTED (summary->events, "event"), first > 0 ? "; the last ones:" : "");
   for (const pw_event *e = summary->event + first; e < summary->event + summary->events; e++)
     pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15), PW_NAME (pw_system_row_name, system, e->row),

@@ -35,7 +35,7 @@ class Result:
         Why no errors can be stated, or "".
     events : list of dict
         Changes of constraint equations whose reactions have limits: t [s], reaction, from, to ("holds", "slides+",
-        "slides-", "free") and, of an impact, impulse [N s, N m s].
+        "slides-", "free") and, of an impact, impulse [N s, N m s].  Empty with the method moreau, which locates none.
     stopped : float or None
         The time at which the condition ``until`` became true [s].
     model : Model or None
