@@ -251,10 +251,10 @@ enum { PW_ASSIGNED_NAME = 200 }; /* longest name, its end included */
 int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
                        double *value, pw_error *error);
 
-/* Calls `set`, which is pw_model_set or pw_model_set_initial, with every "NAME=VALUE" of a list ended by NULL;
- * `option` is "--set" or "--start".  PW_INPUT. */
-int pw_cli_apply (pw_model *m, const char *option, const char **list,
-                  int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
+/* Sets the parameters of --set and the initial values of --start in a model that is not built yet.  PW_INPUT. */
+int pw_cli_apply (const pw_cli_line *line, pw_model *m, pw_error *error);
+/* 1 if the name may be that of a state: it has a dot, or the model with its defaults has this first-order state. */
+int pw_cli_is_state (const pw_file *file, const char *name);
 
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);

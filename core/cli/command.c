@@ -242,22 +242,45 @@ int pw_cli_assignment (const char *option, const char *text, const char *form, c
   return status == PW_OK ? status : pw_fail (error, status, "%s %s: \"%s\" is not a number", option, text, equals + 1);
 }
 
-int pw_cli_apply (pw_model *m, const char *option, const char **list,
-                  int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error) {
-  for (; list && *list; list++) {
-    char name[PW_ASSIGNED_NAME];
-    double value;
-    int status = pw_cli_assignment (option, *list, "NAME=VALUE", name, &value, error);
-    if (status != PW_OK) return status;
-    /* names of states have a dot, those of parameters have none */
-    int is_parameter = pw_cli_parameter (m, name) != NULL;
-    if (is_parameter && strcmp (option, "--start") == 0)
-      return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", *list, name);
-    if (!is_parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
-      return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
-                      *list);
-    if (set (m, name, value, error) != PW_OK) return error->status;
-  }
+int pw_cli_is_state (const pw_file *file, const char *name) {
+  pw_error none = { 0 };
+  pw_model *m = strchr (name, '.') ? NULL : pw_file_model (file, &none);
+  pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
+  const int found = strchr (name, '.') || (s && pw_system_find_state (s, name, &none) >= 0);
+  pw_system_free (s);
+  pw_model_free (m);
+  return found;
+}
+
+/* Sets a parameter that the model does not have: fails with a hint. */
+static int cli_set_other (const pw_cli_line *line, pw_model *m, const char *text, const char *name, pw_error *error) {
+  const char *included = pw_file_included_parameter (line->m.file, name);
+  if (pw_cli_is_state (line->m.file, name))
+    return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
+                    text);
+  if (included == NULL) return pw_model_set (m, name, 0, error);
+  return pw_fail (
+      error, PW_INPUT,
+      "--set %s: %s is a parameter of an included file; the model sets it by \"set: {%s: NAME}\" in the entry "
+      "of that file, from a parameter NAME of its own",
+      text, included, included);
+}
+
+int pw_cli_apply (const pw_cli_line *line, pw_model *m, pw_error *error) {
+  for (int starts = 0; starts < 2; starts++)
+    for (const char **text = starts ? line->starts : line->sets; text && *text; text++) {
+      char name[PW_ASSIGNED_NAME];
+      double value;
+      int status = pw_cli_assignment (starts ? "--start" : "--set", *text, "NAME=VALUE", name, &value, error);
+      if (status != PW_OK) return status;
+      const int is_parameter = pw_cli_parameter (m, name) != NULL;
+      if (is_parameter && starts)
+        return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", *text, name);
+      status = starts         ? pw_model_set_initial (m, name, value, error)
+               : is_parameter ? pw_model_set (m, name, value, error)
+                              : cli_set_other (line, m, *text, name, error);
+      if (status != PW_OK) return status;
+    }
   return PW_OK;
 }
 
@@ -287,9 +310,7 @@ int pw_cli_file (pw_cli_line *line, pw_error *error) {
 int pw_cli_open (pw_cli_line *line, pw_error *error) {
   pw_cli_model *m = &line->m;
   if (pw_cli_file (line, error) == PW_OK) m->model = pw_file_model (m->file, error);
-  if (m->model && pw_cli_apply (m->model, "--set", line->sets, pw_model_set, error) == PW_OK &&
-      pw_cli_apply (m->model, "--start", line->starts, pw_model_set_initial, error) == PW_OK &&
-      pw_model_build (m->model, error) == PW_OK)
+  if (m->model && pw_cli_apply (line, m->model, error) == PW_OK && pw_model_build (m->model, error) == PW_OK)
     m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
 }

@@ -161,7 +161,7 @@ static void list_kind (const void *entry) {
   puts ("    fields");
   for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)
-    printf ("    a signal: a number, an expression of t%s, or a form of `pinwheel list signals`\n",
+    printf ("    a signal is a number, an expression of t%s, or a form shown by `pinwheel list signals`\n",
             pw_kind_signals_force (k)      ? " and of states such as BODY.phi"
             : pw_kind_signals_feedback (k) ? ", of positions and first-order states"
                                            : "");
@@ -179,7 +179,7 @@ static int list_kinds (const char **name, pw_error *error) {
                   { 1, PW_FORCE, "forces" },
                   { 0, PW_FORCE, "without effect" } };
   if (*name) return list_named ("element type", (const void *const *)pw_kinds, list_kind, name, error);
-  puts ("Element types (kinds)");
+  puts ("Element types, or kinds.  A model names them in its list of elements.");
   for (size_t i = 0; i < sizeof section / sizeof *section; i++) {
     printf ("  %s\n", section[i].title);
     for (const pw_kind *const *k = pw_kinds; *k; k++)
@@ -194,20 +194,18 @@ static int list_kinds (const char **name, pw_error *error) {
 
 static int list_signals (const char **name, pw_error *error) {
   (void)name, (void)error;
-  puts ("Signals: a number, an expression of time (in C a function), or one of");
+  puts ("A signal is a number, an expression of time (in C a function), or one of these forms:");
   for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
     printf ("  %s: %s\n", s->name, s->about);
     for (pw_table t = { 0 }; pw_table_pass (&t);) {
       list_fields (&t, s->fields);
       if (s->type != PW_TABLE) continue; /* the rest is in text models alone */
-      list_row (&t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
-      list_row (&t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
-      list_row (&t, "columns", "2 x text", "[1, 2]",
-                "names or numbers of its columns of times and values; only in a text model");
-      list_row (&t, "time", "text", "1", "its column of times; if given, `columns` may have that of values alone");
-      list_row (&t, "time_scale", "number", "1 (> 0)",
-                "factor of the times, such as 1e-3 for ms; only in a text model");
-      list_row (&t, "time_offset", "number [s]", "0", "added to the scaled times; only in a text model");
+      list_row (&t, "points", "list", "", "[[TIME, VALUE], ...]; this and what follows are in text models only");
+      list_row (&t, "file", "text", "", "CSV file in the model's folder, in place of `points`");
+      list_row (&t, "columns", "2 x text", "[1, 2]", "names or numbers of its columns of times and values");
+      list_row (&t, "time", "text", "1", "its column of times; `columns` then names the column of values");
+      list_row (&t, "time_scale", "number", "1 (> 0)", "factor of the times, such as 1e-3 for ms");
+      list_row (&t, "time_offset", "number [s]", "0", "added to the scaled times");
     }
   }
   return PW_OK;

@@ -503,6 +503,10 @@ const char *pw_file_path (const pw_file *f) {
   return f ? f->path : NULL;
 }
 
+const char *pw_file_included_parameter (const pw_file *f, const char *name) {
+  return f && f->yaml ? pw_yaml_included_parameter (f->yaml->root, name) : NULL;
+}
+
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
   return f && f->yaml ? pw_yaml_tables (f->yaml, 1, each, context) : 0;
 }

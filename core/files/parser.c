@@ -627,9 +627,13 @@ double pw_condition_value (void *condition, const pw_sample *x) {
 static int condition_columns (pw_condition *c, const pw_system *s, const char *text, const char **names,
                               pw_error *error) {
   char name[PW_EXPRESSION_NAME];
-  for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;) {
+  for (const char *rest = text, *at; (at = pw_expression_next_name (&rest, name)) != NULL;) {
     int i = 0;
     if (pw_expression_is_reserved (name)) continue;
+    while (at > text && at[-1] == ' ') at--;
+    if (at > text && strchr (".0123456789", at[-1]))
+      return pw_fail (error, PW_INPUT,
+                      "\"%s\" after a number: write it without a unit, in SI units, angles in rad or as 90*deg", name);
     while (i < c->columns && strcmp (names[i], name) != 0) i++;
     if (i < c->columns) continue;
     if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "more than %d columns", PW_FORMULA_NAMES);

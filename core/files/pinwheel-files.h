@@ -126,6 +126,10 @@ int pw_condition_needs_ledger (const pw_condition *c); /* 1: it reads columns th
 double pw_condition_value (void *condition, const pw_sample *x);
 void pw_condition_close (pw_condition *c);
 
+/* The name that a parameter has in a file that a text model includes, given that name or with the file's prefix; NULL:
+ * there is none. */
+const char *pw_file_included_parameter (const pw_file *f, const char *name);
+
 /* ---- Tables of numbers, and units in their headers, "NAME [UNIT]" (columns.c) ---- */
 
 /* Finds the factor from a unit to SI units.  PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of

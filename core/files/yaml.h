@@ -91,6 +91,9 @@ const char *pw_yaml_renamed (const pw_renames *names, const char *text, pw_arena
 /* Reads a model and the files in its lists `include`, whose maps replace their names; arguments as in pw_yaml_open. */
 int pw_yaml_read_files (pw_yaml *y, const char *path, const char *shown, size_t max_bytes, pw_error *error);
 
+/* See pw_file_included_parameter; root: of a file. */
+const char *pw_yaml_included_parameter (const pw_node *root, const char *name);
+
 /* Stores the path of a file that is named at an offset, links resolved; 0, and the reason (errno if it cannot be
  * resolved), unless it is in the folder of the model.  from_model receives its path from there. */
 int pw_yaml_find (const pw_yaml *y, size_t at, const char *name, char path[PW_PATH], char from_model[PW_PATH],

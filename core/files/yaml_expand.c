@@ -375,3 +375,27 @@ const char *pw_place_direction (const pw_place *p, const pw_kind *kind, const ch
       return f->name;
   return NULL;
 }
+
+/* The value of a key of a map; NULL: it has none, or is no map. */
+static const pw_node *include_value (const pw_node *map, const char *key) {
+  const pw_node *k = map && map->type == PW_YAML_MAP ? map->first : NULL;
+  while (k && (k->type != PW_YAML_SCALAR || strcmp (k->text, key) != 0)) k = k->next->next;
+  return k ? k->next : NULL;
+}
+
+const char *pw_yaml_included_parameter (const pw_node *root, const char *name) {
+  const pw_node *list = include_value (root, "include");
+  for (const pw_node *entry = list && list->type == PW_YAML_LIST ? list->first : NULL; entry; entry = entry->next) {
+    const pw_node *file = include_value (entry, "file"), *prefix = include_value (entry, "prefix"),
+                  *parameters = include_value (file, "parameters");
+    const size_t n = prefix && prefix->type == PW_YAML_SCALAR ? strlen (prefix->text) : 0;
+    const char *own = n && strncmp (name, prefix->text, n) == 0 ? name + n : name;
+    for (const pw_node *p = parameters && parameters->type == PW_YAML_LIST ? parameters->first : NULL; p; p = p->next) {
+      const pw_node *known = include_value (p, "name");
+      if (known && known->type == PW_YAML_SCALAR && strcmp (known->text, own) == 0) return known->text;
+    }
+    const char *below = pw_yaml_included_parameter (file, own);
+    if (below) return below;
+  }
+  return NULL;
+}

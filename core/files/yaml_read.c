@@ -323,10 +323,11 @@ static int state_of_element (pw_reader *r, const pw_node *node, const char *owne
                           owner, list, part);
 }
 
+const char *const pw_body_states[6] = { "x", "y", "phi", "vx", "vy", "omega" };
+
 int pw_body_state (const char *part) {
-  static const char *const parts[] = { "x", "y", "phi", "vx", "vy", "omega" };
   int i = 0;
-  while (i < 6 && strcmp (parts[i], part) != 0) i++;
+  while (i < 6 && strcmp (pw_body_states[i], part) != 0) i++;
   return i < 6 ? i : -1;
 }
 

@@ -160,7 +160,8 @@ int pw_yaml_expression (pw_reader *r, const pw_node *node, const char *const *va
 /* Indexes all elements of the file, including those not built yet, besides those of files built before. */
 int pw_index_elements (pw_reader *r);
 
-/* The number of a body's state, 0 to 5 for x to omega, or -1. */
+/* The names of a body's states, x to omega, and the number of one, or -1. */
+extern const char *const pw_body_states[6];
 int pw_body_state (const char *part);
 
 /* Checks that a name with a dot, or that of a first-order state, at an offset of the expression, names a state. */

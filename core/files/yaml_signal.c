@@ -139,19 +139,18 @@ static const char *expand_name (void *context, const char *name) {
 
 /* Reports a name that is no column, with the nearest column of its body or element, or the nearest of these. */
 static int output_unknown (pw_reader *r, const pw_node *node, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  static const char *const other[] = { "x", "y", "work", "loss" };
   const size_t n = strcspn (name, ".");
   const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
   const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
   const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
   pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
-  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, part[i]);
+  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, pw_body_states[i]);
   for (int i = 0; kind && i < 2 * kind->internal; i++)
     pw_nearest_try (&near, i % 2 ? kind->coordinate[i / 2].rate : kind->coordinate[i / 2].name);
   for (int i = 0; kind && i < kind->rows; i++) pw_nearest_try (&near, kind->reaction[i].name);
   for (int i = 0; kind && i < 4; i++)
-    if (pw_kind_find_column (kind, ((const char *const[]){ "x", "y", "work", "loss" })[i], &(pw_column){ 0 }))
-      pw_nearest_try (&near, ((const char *const[]){ "x", "y", "work", "loss" })[i]);
+    if (pw_kind_find_column (kind, other[i], &(pw_column){ 0 })) pw_nearest_try (&near, other[i]);
   if (is_body || kind)
     return expression_fail (r, node, at + n + 1, "%s has no column \"%.60s\"%s", owner, name + n + 1,
                             pw_nearest_text (&near));

@@ -281,7 +281,7 @@ static const pw_field form_table[] = {
     .about = "interpolation between the points" },
   { FORM_AT (table, ends), PW_CHOICE, .choices = form_ends,
     .about = "end conditions of a cubic table: free (not-a-knot), or at rest (zero slope)" },
-  { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values, not 0; omitted: 1" },
+  { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values, not 0; left out: 1" },
   { FORM_AT (table, offset), PW_NUMBER, .about = "added to the scaled values" },
   { .name = NULL },
 };

@@ -927,8 +927,9 @@ static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *err
   pw_list_elements (s, violated, 1, elements, sizeof elements);
   if (*elements == 0) return PW_OK;
   return pw_fail (error, PW_INITIAL,
-                  "model %s: the given velocities would have to be removed entirely: %s allow no such motion%s",
-                  s->model, elements, strchr (elements, ',') ? pw_advice_on_wheel (s, last) : "");
+                  "model %s: the given velocities would have to be removed entirely: %s allow%s no such motion%s",
+                  s->model, elements, strchr (elements, ',') ? "" : "s",
+                  strchr (elements, ',') ? pw_advice_on_wheel (s, last) : "");
 }
 
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error) {

@@ -143,8 +143,7 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
 /* The model with these values of the unknowns, compiled.  Close it by pw_cli_close_model in every case. */
 static int unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
   *m = (pw_cli_model){ .model = pw_file_model (u->line->m.file, error) };
-  int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
-  if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
+  int status = m->model ? pw_cli_apply (u->line, m->model, error) : error->status;
   for (int i = 0; i < u->count && status == PW_OK; i++)
     status = (u->list[i].parameter ? pw_model_set : pw_model_set_initial) (m->model, u->list[i].name, x[i], error);
   if (status == PW_OK) status = pw_model_build (m->model, error);

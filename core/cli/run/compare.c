@@ -469,7 +469,9 @@ static void conclusion_print_table (const pw_conclusion *conclusion) {
       any_uncertain |= *text == 'u';
     }
   }
-  puts (bounds ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
+  puts (bounds ? "\n< marks an upper bound: the least accurate run has more digits already, or a run next to it failed "
+                 "or is as\n"
+                 "accurate as the reference"
                : "");
   if (any_uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
 }

@@ -80,30 +80,38 @@ void pw_report_model (const pw_cli_model *m) {
 
 /* ---- Initialisation ---- */
 
-/* States that the consistent initialisation has changed. */
+/* States that the consistent initialisation has changed: values that were specified, and those that were left out. */
 static void report_initial (pw_run *run, const pw_system *system) {
   const pw_initial_report *initial = pw_run_initial (run);
-  int n = pw_system_coordinates (system), moved = initial->moved, listed = 0;
-  char changed[80] = "", rounded[80] = "", reason[300];
-  if (moved == 0) return;
-  if (initial->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", initial->changed);
+  int n = pw_system_coordinates (system), changed = 0, listed = 0;
+  char rounded[80] = "", reason[300];
+  if (initial->moved == 0) return;
+  for (int state = 0; state < 2 * n; state++)
+    changed += pw_initial_moved (system, initial, state) && pw_initial_specified (initial, state);
+  const char *left = PW_COUNTED (initial->moved - changed, "initial value");
   if (initial->rounded)
     snprintf (rounded, sizeof rounded, " (%d by less than 1e-2 of its unit, as if rounded)", initial->rounded);
-  pw_cli_say ("pinwheel: the initial values did not satisfy the constraints; %d of them %s changed%s%s%s:\n", moved,
-              moved == 1 ? "was" : "were", initial->released ? ", including given ones" : "", changed, rounded);
+  if (changed)
+    pw_cli_say ("pinwheel: the initial values do not satisfy the constraints: %d %s changed%s%s%s:\n", changed,
+                changed == 1 ? "was" : "were", initial->released ? ", including given ones" : "", rounded,
+                changed < initial->moved ? PW_PRINTED (80, "; %s left out follow%s from them", left,
+                                                       initial->moved - changed == 1 ? "s" : "")
+                                         : "");
+  else
+    pw_cli_say ("pinwheel: %s left out follow%s from the constraints:\n", left, initial->moved == 1 ? "s" : "");
   for (int specified = 1; specified >= 0; specified--)
     for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
       if (!pw_initial_moved (system, initial, state) || pw_initial_specified (initial, state) != specified) continue;
       const pw_state_change c = pw_cli_state_change (system, initial, state);
       const char *origin = pw_initial_given (initial, state) ? "given" : "specified";
       if (specified) pw_run_initial_reason (run, state, reason, sizeof reason);
-      pw_cli_say ("  %s from %s to %s%s%s", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10),
-                  *c.unit ? " " : "", c.unit);
+      pw_cli_say (specified ? "  %s from %s to" : "  %s =", c.name, PW_DIGITS (c.given, 10));
+      pw_cli_say (" %s%s%s", PW_DIGITS (c.consistent, 10), *c.unit ? " " : "", c.unit);
       if (specified) pw_cli_say (" (%s%s%s)", origin, *reason ? "; otherwise " : "", reason);
       pw_cli_say ("\n");
       listed++;
     }
-  report_more (stderr, moved - listed, "");
+  report_more (stderr, initial->moved - listed, "");
 }
 
 int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *error) {

@@ -145,11 +145,10 @@ static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena,
 int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
   pw_model *model = pw_file_model (plan->line->m.file, error);
   *compiled = (pw_cli_model){ .model = model };
-  int status = model ? pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error) : error->status;
+  int status = model ? pw_cli_apply (plan->line, model, error) : error->status;
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++) /* varied initial values are set when the run begins */
     if (plan->grid.axis[i].parameter)
       status = pw_model_set (model, plan->grid.axis[i].name, pw_grid_value (&plan->grid, i, row), error);
-  if (status == PW_OK) status = pw_cli_apply (model, "--start", plan->line->starts, pw_model_set_initial, error);
   if (status == PW_OK) status = pw_model_build (model, error);
   if (status == PW_OK) compiled->system = pw_system_compile (model, error);
   if (compiled->system == NULL) return error->status;
@@ -169,15 +168,7 @@ static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model,
   for (const char **given = parameter ? plan->line->sets : plan->line->starts; given && *given; given++)
     if (strncmp (*given, axis->name, n) == 0 && (*given)[n] == '=')
       return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
-  if (parameter == NULL) { /* a first-order state, whose name has no dot, may be in the model with its defaults */
-    pw_error none = { 0 };
-    pw_model *m = strchr (axis->name, '.') ? NULL : pw_file_model (plan->line->m.file, &none);
-    pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
-    const int found = strchr (axis->name, '.') || (s && pw_system_find_state (s, axis->name, &none) >= 0);
-    pw_system_free (s);
-    pw_model_free (m);
-    if (found) return PW_OK;
-  }
+  if (parameter == NULL && pw_cli_is_state (plan->line->m.file, axis->name)) return PW_OK;
   for (long i = 0; i < axis->count; i++)
     if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
       return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
@@ -227,13 +218,19 @@ typedef struct {
 } plan_scan;
 
 /* Checks outputs and the condition of --until; stores names and units of outputs. */
-static int plan_open_outputs (pw_plan *plan, const pw_system *system, pw_error *error) {
+static int plan_open_outputs (pw_plan *plan, const pw_system *system, long row, pw_error *error) {
   pw_outcomes set;
+  pw_error own = { 0 };
+  char run[300] = "";
   char unit[60];
   while (plan->of && plan->of[plan->outputs]) plan->outputs++;
   plan->output = pw_arena_alloc (&plan->arena, (size_t)plan->outputs * sizeof *plan->output);
   if (plan->output == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_outcomes_open (&set, system, "--of", plan->of, plan->outputs, plan->line->until, error);
+  int status = pw_outcomes_open (&set, system, "--of", plan->of, plan->outputs, plan->line->until, &own);
+  for (size_t i = 0, used = 0; i < (size_t)plan->grid.axes && used < sizeof run; i++)
+    used += (size_t)snprintf (run + used, sizeof run - used, "%s%s = %s", i ? ", " : "", plan->grid.axis[i].name,
+                              PW_DIGITS (pw_grid_value (&plan->grid, (int)i, row), 6));
+  if (status != PW_OK) pw_fail (error, status, "%.400s (in the run with %s)", own.text, run);
   for (int i = 0; i < plan->outputs && status == PW_OK; i++) {
     if (pw_names_find (&plan->column_of, plan->of[i]) >= 0 || strcmp (plan->of[i], "t") == 0 ||
         strcmp (plan->of[i], "kinetic") == 0)
@@ -255,7 +252,7 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   if (status == PW_OK) plan->tables_sum = pw_fingerprint_tables (plan->tables_sum, compiled.model);
   if (status == PW_OK) status = plan_add_columns (plan, compiled.system, &row_error);
   if (status == PW_OK && !scan->complete && (plan->of || plan->line->until) &&
-      plan_open_outputs (plan, compiled.system, error) != PW_OK)
+      plan_open_outputs (plan, compiled.system, row, error) != PW_OK)
     status = PW_RESOURCE, row_error = *error;
   /* what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since results
    * of different codes differ by round-off */
@@ -384,7 +381,7 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   if (status != PW_OK) return status;
   pw_model *model = pw_file_model (plan->line->m.file, error);
   if (model == NULL) return error->status;
-  status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
+  status = pw_cli_apply (plan->line, model, error);
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
     status = plan_match_axis (plan, plan->grid.axis + i, model, error);
   if (status == PW_OK) status = plan_find_columns (plan, error);

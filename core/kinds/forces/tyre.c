@@ -106,7 +106,7 @@ static const pw_field tyre_fields[] = {
   { PW_AT (pw_tyre, load), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,
     .about = "normal load; with friction it limits the force" },
   { PW_AT (pw_tyre, friction), PW_NUMBER, .domain = PW_NONNEGATIVE,
-    .about = "the limit is friction times load; 0, and then no load either: no limit" },
+    .about = "friction coefficient: the force is at most this times the load; 0: no limit, and no load" },
   { .name = NULL },
 };
 

@@ -84,9 +84,9 @@ static const pw_field curve_fields[] = {
     .about = "x of the curve in the world, as a function of its parameter s, with two derivatives" },
   { PW_AT (pw_on_curve, y), PW_SIGNAL, .unit = "m", .required = 1, .about = "y of the curve, a function of s" },
   { PW_AT (pw_on_curve, start), PW_NUMBER, .given = offsetof (pw_on_curve, specified[0]),
-    .about = "initial s; omitted: from the body's position" },
+    .about = "initial s; left out: it follows from the body's position" },
   { PW_AT (pw_on_curve, rate), PW_NUMBER, .unit = "1/s", .given = offsetof (pw_on_curve, specified[1]),
-    .about = "initial velocity of s; omitted: from the body's velocity" },
+    .about = "initial velocity of s; left out: it follows from the body's velocity" },
   { .name = NULL },
 };
 

@@ -89,7 +89,7 @@ static const pw_field rolling_fields[] = {
   { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .given = offsetof (pw_rolling_wheel, specified[0]),
     .about = "initial spin angle" },
   { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s", .given = offsetof (pw_rolling_wheel, specified[1]),
-    .about = "initial spin velocity; omitted: from rolling at the body's initial velocity" },
+    .about = "initial spin velocity; left out: the wheel rolls at the body's initial velocity" },
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
     .about = "torque on the wheel about its axle; positive: drives along the heading" },
   { .name = NULL },
