@@ -216,8 +216,18 @@ int pw_cli_requires (const char *option, const char *value, const char *required
  * unchanged.  PW_INPUT if it is neither or lies outside the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
-/* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
-int pw_cli_range (const char *text, double *first, double *last);
+/* The length of a text up to a character outside of parentheses, or its end. */
+size_t pw_cli_part (const char *text, char end);
+
+/* A range from a number to another one, which may be less. */
+typedef struct {
+  double low, high;
+  long count;      /* 0: not given */
+  int logarithmic; /* 1: both are > 0 */
+} pw_range;
+/* Reads "[NAME=]LOW:HIGH[:COUNT][:log]", or the old spelling "NAME=lin:LOW:HIGH:COUNT" (or log:) with a notice; `option`
+ * begins messages.  PW_INPUT. */
+int pw_cli_range (const char *option, const char *text, pw_range *range, pw_error *error);
 
 /* Settings except `ledger` and `specialised`, whose span is the final time, and limit of a run, from options and
  * defaults.  The limit must outlive the run. */

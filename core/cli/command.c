@@ -172,13 +172,40 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
   return PW_OK;
 }
 
-int pw_cli_range (const char *text, double *first, double *last) {
-  const char *colon = strchr (text, ':');
-  char number[100];
-  if (colon == NULL || (size_t)(colon - text) >= sizeof number) return PW_INPUT;
-  snprintf (number, sizeof number, "%.*s", (int)(colon - text), text);
-  if (pw_read_expression (number, first) != PW_OK || pw_read_expression (colon + 1, last) != PW_OK) return PW_INPUT;
-  return isfinite (*last - *first) ? PW_OK : PW_INPUT;
+size_t pw_cli_part (const char *text, char end) {
+  size_t n = 0;
+  for (int depth = 0; text[n] && (text[n] != end || depth > 0); n++) depth += (text[n] == '(') - (text[n] == ')');
+  return n;
+}
+
+int pw_cli_range (const char *option, const char *text, pw_range *range, pw_error *error) {
+  const char *equals = strchr (text, '='), *begin = equals ? equals + 1 : text;
+  const int old = strncmp (begin, "lin:", 4) == 0 || strncmp (begin, "log:", 4) == 0;
+  double number[3] = { 0 };
+  int n = 0, good = 1;
+  *range = (pw_range){ .logarithmic = old && begin[1] == 'o' };
+  for (const char *c = begin + 4 * old; c && good;) {
+    const size_t size = pw_cli_part (c, ':');
+    const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
+    c = c[size] ? c + size + 1 : NULL;
+    if (n >= 2 && c == NULL && strcmp (part, "log") == 0)
+      range->logarithmic = 1;
+    else
+      good = n < 3 && pw_read_expression (part, &number[n]) == PW_OK && isfinite (number[n++]);
+  }
+  range->low = number[0], range->high = number[1];
+  if (!good || n < 2 || !isfinite (range->high - range->low))
+    return pw_fail (error, PW_INPUT, "%s %s: expected %sLOW:HIGH[:COUNT][:log], numbers", option, text,
+                    equals ? "NAME=" : "");
+  if (n == 3 && *pw_domain_check (PW_COUNT, number[2]))
+    return pw_fail (error, PW_INPUT, "%s %s: expected a count that is a whole number >= 1", option, text);
+  range->count = (long)number[2];
+  if (range->logarithmic && !(range->low > 0 && range->high > 0))
+    return pw_fail (error, PW_INPUT, "%s %s: the ends of a logarithmic range must be > 0", option, text);
+  if (old)
+    pw_cli_say ("pinwheel: %s %s: an old spelling of %.*s%s%s\n", option, text, (int)(begin - text), text, begin + 4,
+                range->logarithmic ? ":log" : "");
+  return PW_OK;
 }
 
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,

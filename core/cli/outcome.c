@@ -216,7 +216,9 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
   pw_error own = { 0 };
   *set = (pw_outcomes){ .system = s, .outcome = calloc ((size_t)count + 1, sizeof *set->outcome), .until = until };
   set->workspace = pw_workspace_new (s, error);
-  if (set->outcome == NULL || set->workspace == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  set->value = calloc ((size_t)count + 1, sizeof *set->value);
+  if (set->outcome == NULL || set->value == NULL || set->workspace == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
   if (until && (set->condition = pw_condition_open (s, until, &own)) == NULL)
     return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
   set->ledger = until && pw_condition_needs_ledger (set->condition);
@@ -239,6 +241,7 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
 void pw_outcomes_close (pw_outcomes *set) {
   for (int i = 0; i < set->outcomes; i++) pw_formula_close (set->outcome[i].formula);
   free (set->outcome);
+  free (set->value);
   free (set->functional);
   pw_condition_close (set->condition);
   pw_workspace_free (set->workspace);

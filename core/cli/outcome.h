@@ -73,6 +73,7 @@ typedef struct {
 typedef struct {
   const pw_system *system;
   pw_outcome *outcome;
+  double *value; /* outcomes: for the caller's use */
   int outcomes;
   pw_functional *functional; /* each once */
   int functionals;

@@ -221,6 +221,10 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_text (&j, "engine", summary->general == NULL ? NULL : *summary->general ? "general" : "specialised");
   pw_json_text (&j, "engine_reason", summary->general);
   json_sample (&j, s, sample, ledger);
+  if (summary->of) pw_json_open (&j, "of", '{');
+  for (int i = 0; summary->of && summary->of[i]; i++)
+    pw_json_number (&j, summary->of[i], summary->of_value ? summary->of_value[i] : NAN);
+  if (summary->of) pw_json_close (&j, '}');
   if (summary->until)
     pw_json_text (&j, "stopped",
                   isnan (summary->stop_time) ? NULL

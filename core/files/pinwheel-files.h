@@ -333,6 +333,8 @@ typedef struct {
   const pw_reference_error *reference; /* NULL: no reference */
   const pw_stated_error *stated;       /* NULL: not asked for */
   const char *general;                 /* why the general engine was used; "": it was not; NULL: no run */
+  const char *const *of;               /* outputs of --of, ended by NULL; NULL: none */
+  const double *of_value;              /* their values; NULL: not known */
   const char *until;                   /* the condition of --until; NULL: none */
   double stop_time;                    /* at which it has ended the run [s]; NaN: it has not become true */
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */

@@ -99,7 +99,7 @@ TEST (all_of_one) {
 TEST (options) {
   cli_good (
       "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+projection --vary alpha=0,5 --vary "
-      "beta=log:1:100:3 --vary every=1,4,16 -o @/options && tail -n +2 @/options/drift.csv | cut -d, -f1 | uniq -c "
+      "beta=1:100:3:log --vary every=1,4,16 -o @/options && tail -n +2 @/options/drift.csv | cut -d, -f1 | uniq -c "
       "| tr -s ' ' && ls @/options");
   assert_non_null (
       strstr (cli_out,
@@ -199,7 +199,7 @@ TEST (bad) {
     { "ezyroller --vary alfa=1", "--vary alfa=1: alpha, beta and every can be varied; did you mean \"alpha\"?" },
     { "ezyroller --vary alpha=-1", "--vary alpha=-1: expected a number >= 0" },
     { "ezyroller --vary every=1.5", "--vary every=1.5: expected a whole number >= 1" },
-    { "ezyroller --methods rk4 --vary alpha=lin:1:1e6:100000", "400015 runs are too many; vary less" },
+    { "ezyroller --methods rk4 --vary alpha=1:1e6:100000", "400015 runs are too many; vary less" },
     { "ezyroller --only-methods --vary alpha=1", "--vary alpha=1: not with --only-methods" },
     { "ezyroller --stp 3", "drift has no option \"--stp\"; did you mean \"--step\"?" },
   };

@@ -344,7 +344,7 @@ TEST (bounded) {
            "@/line.csv:1: there are no names of columns before the numbers, so no \"t\"");
   cli_bad ("pinwheel run ezyroller --reference @/zero.csv", 2, "@/zero.csv: a table is text, and this has a byte 0");
   cli_bad ("pinwheel run ezyroller --reference @/zero2.csv", 2, "@/zero2.csv: a table is text, and this has a byte 0");
-  static const char *const many[] = { "sweep pendulum --vary l=lin:1:2:9999 -o @/many.csv",
+  static const char *const many[] = { "sweep pendulum --vary l=1:2:9999 -o @/many.csv",
                                       "optimise pendulum --minimise pivot.Fx --free l=1:2 --starts 9999" };
   for (int i = 0; i < 2; i++)
     cli_bad (check_text ("ulimit -v 2000000; pinwheel %s -t 0.1 --jobs 9999 2>@/err9; s=$?; "

@@ -270,7 +270,7 @@ TEST (sweep) {
 
 /* A sweep that was killed, with its cache deleted meanwhile, ends with the same bytes. */
 TEST (sweep_killed) {
-  cli_good (FRESH "s='sweep n-trailer --vary n=1,2 --vary L=lin:0.5:0.6:40 -t 2 --specialise always -j 2'\n"
+  cli_good (FRESH "s='sweep n-trailer --vary n=1,2 --vary L=0.5:0.6:40 -t 2 --specialise always -j 2'\n"
                   "pinwheel $s -o @/whole.csv || exit 1\n"
                   "${PINWHEEL:-build/pinwheel} $s -o @/k.csv >/dev/null 2>&1 &\n"
                   "while kill -0 $! && [ $(cat @/k.csv.part | grep -c ,ok,) -lt 5 ]; do sleep 0.01; done 2>/dev/null\n"

@@ -44,7 +44,7 @@ TEST (every_command) {
   cli_good ("pinwheel show @/bare.yaml");
   cli_shell ("pinwheel linearise @/c.yaml -o @/l");
   cli_good ("pinwheel run @/a.yaml -t 1 --start f=1");
-  cli_good ("pinwheel sweep @/a.yaml -t 1 --vary f=lin:0:1:3 -o @/s.csv");
+  cli_good ("pinwheel sweep @/a.yaml -t 1 --vary f=0:1:3 -o @/s.csv");
   assert_non_null (strstr (cli_file ("s.csv"), "f [N]"));
   cli_good ("pinwheel sensitivity @/a.yaml -t 1 --by lag --by f --of f --of block.x -o @/sens");
   cli_shell ("pinwheel compare @/a.yaml -t 1 --methods rk4,erk8");

@@ -6,7 +6,7 @@
 #include "check.h"
 #include "cli.h"
 
-#define GRID "--vary omega=lin:1:4:4 --vary M0=0.05,0.1,0.2 --t-end 0.05"
+#define GRID "--vary omega=1:4:4 --vary M0=0.05,0.1,0.2 --t-end 0.05"
 
 /* ---- The grid and its rows ---- */
 
@@ -22,13 +22,13 @@ TEST (order) {
   assert_string_equal (cli_out, "1\n13\n");
 }
 
-/* The fourth value of lin:0:1:11 is 0.3, ends are exact, and decades of a logarithmic range are; large numbers do not
+/* The fourth value of 0:1:11 is 0.3, ends are exact, and decades of a logarithmic range are; large numbers do not
  * overflow. */
 TEST (ranges) {
-  cli_good ("pinwheel sweep ezyroller --vary M0=lin:0:1:11 --t-end 0.001 -o @/lin.csv && sed -n 5p @/lin.csv | cut -d, "
+  cli_good ("pinwheel sweep ezyroller --vary M0=0:1:11 --t-end 0.001 -o @/lin.csv && sed -n 5p @/lin.csv | cut -d, "
             "-f1,2");
   assert_string_equal (cli_out, "0.3,ok\n");
-  cli_good ("pinwheel sweep ezyroller --vary M0=log:1e-3:10:5 --t-end 0.001 -o @/log.csv && cut -d, -f1 @/log.csv");
+  cli_good ("pinwheel sweep ezyroller --vary M0=1e-3:10:5:log --t-end 0.001 -o @/log.csv && cut -d, -f1 @/log.csv");
   const double expected[5] = { 1e-3, 1e-2, 0.1, 1, 10 };
   const char *at = strchr (cli_out, '\n') + 1;
   for (int i = 0; i < 5; i++, at = strchr (at, '\n') + 1)
@@ -37,11 +37,11 @@ TEST (ranges) {
             "'M0=max(1,2),(3+0.00000000000000000000000000000000000000000000000000000000000000)' "
             "--t-end 0.001 -o @/list.csv && cut -d, -f1,2 @/list.csv | tail -n 2");
   assert_string_equal (cli_out, "2,ok\n3,ok\n");
-  cli_good ("pinwheel sweep ezyroller --vary M0=lin:-1:-1:1 --t-end 0.001 -o @/one.csv && wc -l <@/one.csv");
+  cli_good ("pinwheel sweep ezyroller --vary M0=-1:-1:1 --t-end 0.001 -o @/one.csv && wc -l <@/one.csv");
   assert_string_equal (cli_out, "2\n");
   cli_write ("unused.yaml", "pinwheel: 1\nabout: a parameter without effect\nparameters: [{name: a, value: 1}]\n"
                             "bodies: [{name: p, mass: 1, inertia: 1}]\n");
-  cli_good ("pinwheel sweep @/unused.yaml --vary a=lin:1e308:1.5e308:3 -t 0.1 -o @/large.csv && cut -d, -f1,2 "
+  cli_good ("pinwheel sweep @/unused.yaml --vary a=1e308:1.5e308:3 -t 0.1 -o @/large.csv && cut -d, -f1,2 "
             "@/large.csv | sed -n 3p");
   assert_string_equal (cli_out, "1.25e+308,ok\n");
 }
@@ -146,7 +146,7 @@ TEST (misspelt_state) {
   cli_write ("counted.c", sweep_counted);
   assert_int_equal (
       cli_run ("rm -f @/counted; export COUNTED=@/counted; pinwheel sweep @/counted.c --t-end 0.01 --vary "
-               "l=lin:1:2:50 --vary b.omgea=0,1 -o @/wrong.csv; s=$?; wc -l <@/counted; exit $s"),
+               "l=1:2:50 --vary b.omgea=0,1 -o @/wrong.csv; s=$?; wc -l <@/counted; exit $s"),
       2);
   assert_non_null (strstr (cli_err, "did you mean \"b.omega\"?"));
   assert_string_equal (cli_out, "1\n");
@@ -192,23 +192,22 @@ TEST (fails_late) {
 
 TEST (bad_input) {
   static const cli_wrong bad[] = {
-    { "", "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,..." },
+    { "", "nothing is varied: add --vary NAME=LOW:HIGH[:COUNT][:log] or NAME=V1,V2,..." },
     { "--vary omga=1,2", "model ezyroller has no parameter \"omga\"; did you mean \"omega\"?" },
     { "--vary frame.vz=1,2", "model ezyroller has no state \"frame.vz\"; did you mean \"frame.vx\"?" },
     { "--vary omega=1,x", "--vary omega=1,x: \"x\" is not a finite number" },
     { "--vary omega=1,,2", "--vary omega=1,,2: \"\" is not a finite number" },
     { "--vary omega=1,inf", "--vary omega=1,inf: \"inf\" is not a finite number" },
-    { "--vary omega=lin:1:2", "--vary omega=lin:1:2: expected lin:FIRST:LAST:COUNT, three numbers" },
-    { "--vary omega=log:1:2:3:4", "--vary omega=log:1:2:3:4: expected log:FIRST:LAST:COUNT, three numbers" },
-    { "--vary omega=lin:1:2:2.5", "--vary omega=lin:1:2:2.5: expected a count that is a whole number >= 1" },
-    { "--vary omega=lin:1:2:1", "--vary omega=lin:1:2:1: a range with two different ends needs at least 2 values" },
-    { "--vary omega=log:0:2:3", "--vary omega=log:0:2:3: the ends of a logarithmic range must be > 0" },
-    { "--vary omega=1:2:3", "--vary omega=1:2:3: a range begins with lin: or log:" },
-    { "--vary omega", "--vary omega: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,..." },
-    { "--vary omega=lin:1:2:2e8", "--vary omega=lin:1:2:2e8: too many values: at most 1e8 rows" },
-    { "--vary omega=lin:1:2:20000 --vary M0=lin:1:2:30000",
+    { "--vary omega=1:x", "--vary omega=1:x: expected NAME=LOW:HIGH[:COUNT][:log], numbers" },
+    { "--vary omega=1:2:3:4", "--vary omega=1:2:3:4: expected NAME=LOW:HIGH[:COUNT][:log], numbers" },
+    { "--vary omega=1:2:2.5", "--vary omega=1:2:2.5: expected a count that is a whole number >= 1" },
+    { "--vary omega=1:2:1", "--vary omega=1:2:1: a range with two different ends needs at least 2 values" },
+    { "--vary omega=0:2:3:log", "--vary omega=0:2:3:log: the ends of a logarithmic range must be > 0" },
+    { "--vary omega", "--vary omega: expected NAME=LOW:HIGH[:COUNT][:log] or a list NAME=V1,V2,..." },
+    { "--vary omega=1:2:2e8", "--vary omega=1:2:2e8: too many values: at most 1e8 rows" },
+    { "--vary omega=1:2:20000 --vary M0=1:2:30000",
       "the grid has 600000000 rows: at most 1e8; use coarser ranges, or several sweeps" },
-    { "--vary m1=lin:1:-1:3", "model ezyroller: parameter m1 = 0: expected a number > 0" },
+    { "--vary m1=1:-1:3", "model ezyroller: parameter m1 = 0: expected a number > 0" },
     { "--vary omega=1,2 --vary omega=3,4", "--vary omega is given twice" },
     { "--vary omega=1,2 --set omega=3", "omega is given by --vary and by --set" },
     { "--vary frame.x=1,2 --start frame.x=3", "frame.x is given by --vary and by --start" },

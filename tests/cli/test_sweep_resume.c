@@ -5,7 +5,7 @@
 #include "check.h"
 #include "cli.h"
 
-#define GRID "--vary omega=lin:1:4:4 --vary M0=0.05,0.1,0.2 --t-end 0.05"
+#define GRID "--vary omega=1:4:4 --vary M0=0.05,0.1,0.2 --t-end 0.05"
 
 /* ---- The same table whatever happens ---- */
 
@@ -47,7 +47,7 @@ TEST (odd_journal) {
 /* A signal, and kills at odd moments, until it is through. */
 TEST (kills) {
   const char *sweep = "p=\"${PINWHEEL:-build/pinwheel}\"\n"
-                      "s='sweep ezyroller --vary omega=lin:1:4:10 --vary M0=0.05,0.1,0.2,0.3 --t-end 4'\n";
+                      "s='sweep ezyroller --vary omega=1:4:10 --vary M0=0.05,0.1,0.2,0.3 --t-end 4'\n";
   cli_shell (check_text ("%s\"$p\" $s -j 1 -o @/whole.csv || exit 1\n"
                          "\"$p\" $s -o @/kill.csv &\n"
                          "while kill -0 $! && ! grep -q '^[0-9]' @/kill.csv.part; do sleep 0.01; done 2>/dev/null; "
@@ -77,9 +77,9 @@ TEST (journal_of_another) {
   OTHER (GRID " --part 1/2 --set a=0.75", "parameter a is 0.5 there and 0.75 here");
   OTHER (GRID " --part 1/2 --start frame.x=1", "start frame.x is 1 here and not set there");
   OTHER (GRID " --part 1/2 -m ida+ggl", "method is rk4+projection there and ida+ggl here");
-  OTHER ("--vary omega=lin:1:4:4 --vary M0=0.05,0.1,0.3 --t-end 0.05 --part 1/2",
+  OTHER ("--vary omega=1:4:4 --vary M0=0.05,0.1,0.3 --t-end 0.05 --part 1/2",
          "vary M0 is 0.05,0.1,0.2 there and 0.05,0.1,0.3 here");
-  OTHER ("--vary M0=0.05,0.1,0.2 --vary omega=lin:1:4:4 --t-end 0.05 --part 1/2",
+  OTHER ("--vary M0=0.05,0.1,0.2 --vary omega=1:4:4 --t-end 0.05 --part 1/2",
          "order is omega,M0 there and M0,omega here");
 #undef OTHER
   cli_write ("mine.csv.part", "t [s],x [m]\n0,1\n");
@@ -90,9 +90,9 @@ TEST (journal_of_another) {
 
 TEST (lock) {
   cli_shell (
-      "\"${PINWHEEL:-build/pinwheel}\" sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv & first=$!\n"
+      "\"${PINWHEEL:-build/pinwheel}\" sweep ezyroller --vary omega=1:4:400 --t-end 50 -o @/lock.csv & first=$!\n"
       "while kill -0 $! 2>/dev/null && [ ! -s @/lock.csv.part ]; do sleep 0.02; done\n"
-      "pinwheel sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv; echo $?; kill -KILL $first");
+      "pinwheel sweep ezyroller --vary omega=1:4:400 --t-end 50 -o @/lock.csv; echo $?; kill -KILL $first");
   assert_string_equal (cli_out, "1\n");
   char expected[200];
   cli_expand ("pinwheel: cannot write @/lock.csv.part: another process is writing it\n", expected, sizeof expected);

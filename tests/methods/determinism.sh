@@ -47,7 +47,7 @@ report 'once more, on memory that is not zero' $?
 unset MALLOC_PERTURB_
 
 for method in rk4+projection ida+ggl ida+baumgarte; do
-  for scene in ezyroller\ --vary\ omega=lin:1:4:12 "$builds/gcc-O2/scenes/zoo.so --vary torque=lin:0:1:12" \
+  for scene in ezyroller\ --vary\ omega=1:4:12 "$builds/gcc-O2/scenes/zoo.so --vary torque=0:1:12" \
     "$builds/gcc-O2/scenes/chain.so --vary links=1,2,3,20,30,40"; do
     for jobs in 1 2 3 8; do
       # shellcheck disable=SC2086

@@ -222,7 +222,7 @@ TEST (starts) {
 
 /* No point of a sweep is better, and the nearest ones are worse by the curvature alone. */
 TEST (sweep) {
-  cli_shell ("pinwheel sweep ezyroller --vary omega=lin:2:6:161 --t-end 5 --step 5e-3 -o @/s.csv");
+  cli_shell ("pinwheel sweep ezyroller --vary omega=2:6:161 --t-end 5 --step 5e-3 -o @/s.csv");
   char *copy = strdup (cli_file ("s.csv")), *line = strchr (copy, '\n');
   double best = -INFINITY, at = 0;
   for (; line && line[1]; line = strchr (line + 1, '\n')) {

@@ -76,11 +76,11 @@ report 'two nodes are idle' $?
 
 # ---- The job of the manual, with a smaller grid ----
 
-manual=docs/manual.md grid='--vary omega=lin:1:10:12 --vary M0=log:0.01:1:10 --t-end 500 --lanes 1'
+manual=docs/manual.md grid='--vary omega=1:10:12 --vary M0=0.01:1:10:log --t-end 500 --lanes 1'
 sed -n '/^    #!\/bin\/sh$/,/^$/s/^    //p' "$manual" | sed -e 's/array=1-16/array=1-6/' -e 's|TASK_ID/16|TASK_ID/6|' \
   -e "s|--vary omega=.* --vary M0=[^ ]*|$grid|" -e 's/cpus-per-task=8/cpus-per-task=1/' >"$work/job.sh"
 merge=$(sed -n "s/^    sbatch --dependency=.* --wrap '\(.*\)'$/\1/p" "$manual")
-grep -q 'array=1-6' "$work/job.sh" && grep -q 'requeue' "$work/job.sh" && grep -q 'omega=lin:1:10:12' "$work/job.sh" && [ -n "$merge" ]
+grep -q 'array=1-6' "$work/job.sh" && grep -q 'requeue' "$work/job.sh" && grep -q 'omega=1:10:12' "$work/job.sh" && [ -n "$merge" ]
 report 'the manual has the job' $?
 PATH=$(dirname "$pinwheel"):$PATH
 "$pinwheel" sweep ezyroller $grid -o "$work/whole.csv" >"$work/log" 2>&1

@@ -5,7 +5,7 @@
 . "$(dirname "$0")/../support/report.sh"
 echo "# SEED=$seed"
 
-grid='ezyroller --vary omega=log:1:10:20 --vary a=0.4,0.5,0.6 --vary frame.omega=0,0.1 --t-end 8'
+grid='ezyroller --vary omega=1:10:20:log --vary a=0.4,0.5,0.6 --vary frame.omega=0,0.1 --t-end 8'
 
 "$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
 report 'an uninterrupted sweep' $?
@@ -81,20 +81,20 @@ same_lanes () {
   rm -f "$work"/lanes.csv*
   report "lanes: $name" $failed
 }
-same_lanes 'initial values' snakeboard --t-end 2 --vary board.vx=lin:0:1:11
-same_lanes 'parameters, work of a signal' ezyroller --t-end 2 --vary m1=lin:0.8:1.2:7 --vary a=0.4,0.5
-same_lanes 'motors' roller-racer --t-end 2 --vary swing=lin:0.4:0.8:5 --vary m1=4,5
-same_lanes 'tyres, without stabilisation' car-tyres --method rk4+none --t-end 2 --vary car.vy=lin:0:1:9
-same_lanes 'springs, runs that fail' andrews-squeezer --method rk4+projection --t-end 0.01 --vary K1.omega=lin:-100:200:5
-same_lanes 'rows with code of their own' n-trailer --t-end 1 --vary n=2,3 --vary w=lin:1:2:8
-same_lanes 'singular configurations' slider-crank --t-end 3 --vary crank.omega=lin:1:5:9
-same_lanes 'order 8' car-two-trailers --method erk8+projection:steps=fixed --t-end 2 --vary car.vx=lin:1:2:5
-same_lanes 'numbers of bodies' n-trailer --t-end 1 --vary n=1,2,3 --vary tractor.vx=lin:0.5:1:5
-same_lanes 'every form of signals' tests/models/signals.yaml --method rk4+projection --t-end 2 --vary roller.omega=lin:0:1:5
-same_lanes 'redundant equations' differential-drive --t-end 1 --vary left=lin:0.3:0.5:3
+same_lanes 'initial values' snakeboard --t-end 2 --vary board.vx=0:1:11
+same_lanes 'parameters, work of a signal' ezyroller --t-end 2 --vary m1=0.8:1.2:7 --vary a=0.4,0.5
+same_lanes 'motors' roller-racer --t-end 2 --vary swing=0.4:0.8:5 --vary m1=4,5
+same_lanes 'tyres, without stabilisation' car-tyres --method rk4+none --t-end 2 --vary car.vy=0:1:9
+same_lanes 'springs, runs that fail' andrews-squeezer --method rk4+projection --t-end 0.01 --vary K1.omega=-100:200:5
+same_lanes 'rows with code of their own' n-trailer --t-end 1 --vary n=2,3 --vary w=1:2:8
+same_lanes 'singular configurations' slider-crank --t-end 3 --vary crank.omega=1:5:9
+same_lanes 'order 8' car-two-trailers --method erk8+projection:steps=fixed --t-end 2 --vary car.vx=1:2:5
+same_lanes 'numbers of bodies' n-trailer --t-end 1 --vary n=1,2,3 --vary tractor.vx=0.5:1:5
+same_lanes 'every form of signals' tests/models/signals.yaml --method rk4+projection --t-end 2 --vary roller.omega=0:1:5
+same_lanes 'redundant equations' differential-drive --t-end 1 --vary left=0.3:0.5:3
 
 if [ "$("$pinwheel" sweep snakeboard --t-end 0.1 --vary board.vx=0,1 --specialise always --lanes 4 -o "$work/x.csv" 2>&1)" = '' ]; then
-  grid='snakeboard --vary board.vx=lin:0:1:40 --t-end 20 --specialise always --lanes 4'
+  grid='snakeboard --vary board.vx=0:1:40 --t-end 20 --specialise always --lanes 4'
   "$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
   signal=KILL most=20
   until_done "$work/killed.csv" --jobs 2

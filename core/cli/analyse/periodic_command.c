@@ -542,7 +542,7 @@ static const struct poptOption periodic_options_table[] = {
                   "Repeat after N periods of the signals (default 1)"),
   PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
                   "First guess of a free period [s] (default: the time of the first return)"),
-  PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=FIRST:LAST", "Follow the motion over a parameter"),
+  PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=LOW:HIGH", "Follow the motion over a parameter"),
   PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
                   "Write periodic.csv, periodic.json and a figure into a folder"),
   PW_WIDTH_OPTION,

@@ -47,7 +47,7 @@ enum { TO_FIRST = -1, TO_LAST = 1 };
 
 /* ---- What is held and varied ---- */
 
-/* Reads --vary NAME=FIRST:LAST: NAME is a parameter of the model, or a quantity that is held at the varied value. */
+/* Reads --vary NAME=LOW:HIGH: NAME is a parameter of the model, or a quantity that is held at the varied value. */
 static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
   if (pw_vary_read (&cmd->vary, &cmd->line, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
@@ -628,7 +628,7 @@ static int steady_command (void *options, pw_error *error) {
 static const struct poptOption steady_options_table[] = {
   PW_OPTION_GROUP ("Steady motions"),
   PW_HOLD_OPTION (pw_steady_command, hold_texts),
-  PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=FIRST:LAST",
+  PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=LOW:HIGH",
                   "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
   PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
                   "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),

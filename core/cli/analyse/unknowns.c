@@ -65,17 +65,18 @@ void pw_unknowns_close (pw_unknowns *u) {
 /* ---- Unknowns of --free ---- */
 
 static int unknown_read_bounds (pw_unknown *u, const char *text, pw_error *error) {
-  double bounds[2];
-  if (pw_cli_range (text, &bounds[0], &bounds[1]) != PW_OK || !(bounds[0] < bounds[1]))
-    return pw_fail (error, PW_INPUT, "--free %s=...: expected bounds LOW:HIGH, two numbers, the first one smaller",
-                    u->name);
+  pw_range bounds;
+  if (pw_cli_range ("--free", text, &bounds, error) != PW_OK) return error->status;
+  if (!(bounds.low < bounds.high)) return pw_fail (error, PW_INPUT, "--free %s: expected LOW < HIGH", text);
+  if (bounds.count) return pw_fail (error, PW_INPUT, "--free %s: a search has no COUNT; see --starts", text);
   for (int i = 0; i < 2 && u->parameter; i++) {
-    const char *expected = pw_domain_check (u->parameter->domain, bounds[i]);
+    const double bound = i ? bounds.high : bounds.low;
+    const char *expected = pw_domain_check (u->parameter->domain, bound);
     if (*expected)
       return pw_fail (error, PW_INPUT, "--free %s: the %s bound is %g, expected %s", u->name, i ? "upper" : "lower",
-                      bounds[i], expected);
+                      bound, expected);
   }
-  u->low = bounds[0], u->high = bounds[1], u->has_bounds = 1;
+  u->low = bounds.low, u->high = bounds.high, u->has_bounds = 1, u->logarithmic = bounds.logarithmic;
   if (u->low <= u->value && u->value <= u->high) return PW_OK;
   return pw_fail (error, PW_INPUT,
                   "--free %s: its value %.9g, where the search starts, is not between %.9g and %.9g; set it by %s",
@@ -94,7 +95,7 @@ static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
   int status = unknown_find (added, &u->line->m, name, error);
   if (added->parameter && added->parameter->domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
-  if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text + size + 1, error);
+  if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text, error);
   added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
   return status;
 }
@@ -241,8 +242,9 @@ static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double 
     gsl_qrng_get (sobol, point);
     for (int j = 0; j < u->count; j++) { /* a fraction, from 0 to 1, of the range in which searches begin */
       const pw_unknown *x = u->list + j;
-      double part = fmod (point[j] + shift[j], 1),
-             value = x->has_bounds ? x->low + part * x->scale : x->value + (2 * part - 1) * x->scale;
+      double part = fmod (point[j] + shift[j], 1), value = x->logarithmic  ? x->low * pow (x->high / x->low, part)
+                                                           : x->has_bounds ? x->low + part * x->scale
+                                                                           : x->value + (2 * part - 1) * x->scale;
       *out++ = fmin (fmax (value, x->low), x->high);
     }
   }
@@ -274,10 +276,14 @@ const char *pw_unknowns_options (const pw_unknowns *u, const double *x, char tex
 
 int pw_vary_read (pw_vary *v, const pw_cli_line *line, const char *text, pw_error *error) {
   const size_t size = strcspn (text, "=");
-  if (size == 0 || size >= sizeof v->unknown.name || strchr (text + size, ':') == NULL)
-    return pw_fail (error, PW_INPUT, "--vary %s: expected NAME=FIRST:LAST", text);
-  if (pw_cli_range (text + size + 1, &v->first, &v->last) != PW_OK || v->first == v->last)
-    return pw_fail (error, PW_INPUT, "--vary %s: expected two different numbers FIRST:LAST", text);
+  pw_range range;
+  if (size == 0 || size >= sizeof v->unknown.name || text[size] == 0)
+    return pw_fail (error, PW_INPUT, "--vary %s: expected NAME=LOW:HIGH", text);
+  if (pw_cli_range ("--vary", text, &range, error) != PW_OK) return error->status;
+  if (range.low == range.high) return pw_fail (error, PW_INPUT, "--vary %s: expected two different numbers", text);
+  if (range.count || range.logarithmic)
+    return pw_fail (error, PW_INPUT, "--vary %s: a branch chooses its points: leave out COUNT and log", text);
+  v->first = range.low, v->last = range.high;
   v->name = memcpy (v->unknown.name, text, size);
   v->parameter = v->unknown.parameter = pw_cli_parameter (line->m.model, v->name);
   v->unknowns = (pw_unknowns){ .line = line, .list = &v->unknown, .count = 1 };

@@ -15,8 +15,9 @@ typedef struct {
   double size;      /* a typical size: set by pw_unknown_measure; else 0 */
   double low, high; /* bounds, of --free or else of the parameter's domain; infinite without one */
   /* for searches: */
-  double scale;   /* size of typical changes: high - low of --free, else |value|, else 1 */
-  int has_bounds; /* 1: the bounds are those of --free, which are finite */
+  double scale;    /* size of typical changes: high - low of --free, else |value|, else 1 */
+  int has_bounds;  /* 1: the bounds are those of --free, which are finite */
+  int logarithmic; /* 1: searches begin at equal ratios between them */
 } pw_unknown;
 
 /* Unknowns of the model of a command line, and the options of its runs. */
@@ -34,7 +35,7 @@ typedef struct {
 /* Reads the options of runs; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
-/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for a name that the model
+/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH[:log]" of --free, ended by NULL.  PW_INPUT for a name that the model
  * does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
 int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
 /* Finds the unknowns of a list of names of --by, ended by NULL; values of initial states are those of the consistent
@@ -103,7 +104,7 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x);
 enum { PW_UNKNOWNS_OPTIONS = 4000 };
 const char *pw_unknowns_options (const pw_unknowns *u, const double *x, char text[PW_UNKNOWNS_OPTIONS]);
 
-/* The option --vary NAME=FIRST:LAST of `steady` and `periodic`: a number that varies continuously. */
+/* The option --vary NAME=LOW:HIGH of `steady` and `periodic`: a number that varies continuously. */
 
 typedef struct {
   const char *name, *unit;       /* "" without --vary; pw_vary_read sets the unit of a parameter alone */

@@ -76,7 +76,7 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
   for (long i = 0; status == PW_OK && i < axis->count; i++) {
     const char *expected = pw_domain_check (option == DRIFT_EVERY ? PW_COUNT : PW_NONNEGATIVE, pw_axis_value (axis, i));
     if (*expected)
-      status = pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %s", axis->name, axis->range, expected);
+      status = pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %s", axis->name, axis->text, expected);
   }
   return status;
 }
@@ -298,7 +298,7 @@ static const struct poptOption drift_options[] = {
   PW_LIST_OPTION (
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",
       "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; repeatable. RANGE: "
-      "V1,V2,..., lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT"),
+      "V1,V2,... or LOW:HIGH[:COUNT][:log]"),
   PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
   PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and figures into a folder"),

@@ -266,13 +266,17 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .status = pw_cli_status_word (error->status),
                          .reason = error->text,
                          .cpu = command->cpu,
-                         .until = command->condition ? command->line.until : NULL,
-                         .stop_time = command->stop_time,
+                         .until = command->outcomes.system ? command->line.until : NULL,
+                         .stop_time = command->outcomes.ended ? command->outcomes.t : NAN,
+                         .of = command->of,
                          .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
                          .redundant = command->redundant,
                          .general = run ? report_general_reason (command) : NULL,
                          .reference = run ? pw_comparison_errors (&command->comparison, command->line.m.system) : NULL,
                          .stated = command->stated.known ? &command->stated.result : NULL };
+  for (int i = 0; i < command->outcomes.outcomes; i++)
+    command->outcomes.value[i] = command->has_outputs ? pw_outcome_value (&command->outcomes, i) : NAN;
+  summary.of_value = command->outcomes.value;
   if (run) summary.event = pw_run_events (run, &summary.events);
   if (error->status == PW_OK && pw_stop) {
     snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
@@ -292,6 +296,18 @@ void pw_report_warnings (const pw_run *run, double defect) {
                 "shorter steps, or a method with adaptive ones\n",
                 stats->unresolved, PW_COUNTED (stats->steps, "step"),
                 pw_run_unresolved (run, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES));
+}
+
+void pw_report_outputs (const pw_run_cli *command, FILE *f) {
+  char unit[60];
+  if (!command->has_outputs) return;
+  fputs ("\n  outputs\n", f);
+  for (pw_table table = { .f = f }; pw_table_pass (&table);)
+    for (int i = 0; i < command->outcomes.outcomes; i++) {
+      report_value (&table, -10, command->of[i], pw_outcome_value (&command->outcomes, i),
+                    pw_outcome_unit (&command->outcomes, i, unit, sizeof unit));
+      pw_row_end (&table);
+    }
 }
 
 void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last) {

@@ -272,17 +272,17 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   status =
       pw_comparison_open (&command->comparison, &command->line, command->reference_path, command->settings.span, error);
   if (status != PW_OK) return status;
-  const char *until = command->line.until;
-  pw_error own = { 0 };
-  command->stop_time = NAN;
-  if (until && command->with_error)
-    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
-  if (until && command->checkpoints.path)
-    return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
-  if (until && (command->condition = pw_condition_open (system, until, &own)) == NULL)
-    return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
-  if (until) command->settings.ledger |= pw_condition_needs_ledger (command->condition);
-  command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
+  const char *follows = command->of ? "of" : command->line.until ? "until" : NULL;
+  if (follows && command->with_error)
+    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --%s", follows);
+  if (follows && command->checkpoints.path)
+    return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --%s", follows);
+  int outputs = 0;
+  while (command->of && command->of[outputs]) outputs++;
+  if (follows)
+    status = pw_outcomes_open (&command->outcomes, system, "--of", command->of, outputs, command->line.until, error);
+  if (status != PW_OK) return status;
+  if (follows) pw_outcomes_settings (&command->outcomes, &command->settings);
   pw_limit_start (&command->limit);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
@@ -309,14 +309,8 @@ static double run_next_row_time (const pw_run_cli *command) {
   return t > 0 && fabs (t - command->settings.span) <= round_off ? command->settings.span : t;
 }
 
-/* Searches the condition of --until in the last step. */
-static int run_check_condition (pw_run_cli *command, pw_error *error) {
-  if (command->condition == NULL) return PW_OK;
-  return pw_run_find_crossing (command->run, &command->crossing, &command->stop_time, error);
-}
-
 static int run_is_stopped (const pw_run_cli *command) {
-  return command->condition && !isnan (command->stop_time);
+  return command->outcomes.ended;
 }
 
 /* Writes rows and stores samples up to the time reached, or that at which --until ends the run, which has a row. */
@@ -368,9 +362,9 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   int status;
   long steps = 0;
   do {
-    status = command->condition ? pw_run_advance (command->run, command->settings.span, error)
-                                : pw_run_advance_towards (command->run, due, command->settings.span, error);
-    if (status == PW_OK) status = run_check_condition (command, error);
+    status = command->outcomes.system
+                 ? pw_outcomes_advance (&command->outcomes, command->run, due, command->settings.span, error)
+                 : pw_run_advance_towards (command->run, due, command->settings.span, error);
     if (run_is_stopped (command)) break;
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
   double seconds = pw_seconds (CLOCK_MONOTONIC) - start;
@@ -396,7 +390,8 @@ static int run_save_checkpoint (pw_run_cli *command, pw_error *error) {
 static int run_steps (pw_run_cli *command, pw_error *error) {
   run_count_cpu (command);
   /* a checkpoint has the samples up to its time */
-  int status = run_check_condition (command, error);
+  pw_outcomes *outcomes = command->outcomes.system ? &command->outcomes : NULL;
+  int status = outcomes ? pw_outcomes_begin (outcomes, command->run, command->settings.span, error) : PW_OK;
   if (status == PW_OK && !command->checkpoints.resume_path) status = run_store_samples (command, error);
   while (status == PW_OK && !run_is_stopped (command) && pw_run_time (command->run) < command->settings.span &&
          !pw_stop) {
@@ -425,6 +420,10 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   int complete = status == PW_OK && (run_is_stopped (command) || pw_run_time (command->run) >= command->settings.span);
   int stated = pw_error_run_finish (&command->stated, complete, error);
   pw_stop_release ();
+  if (complete && command->of) {
+    stated = pw_outcomes_end (&command->outcomes, command->run, error);
+    command->has_outputs = stated == PW_OK;
+  }
   if (complete) {
     pw_stop = 0; /* too late: the run is complete */
     status = stated;
@@ -514,8 +513,9 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   run_close_table (command, error->status == PW_OK && !interrupted, error);
   pw_summary summary = pw_run_summary (command, last, error, reason);
   if (last && command->table_path == NULL && command->summary_path == NULL) pw_report_end (command, &summary, last);
-  pw_report_stated (command,
-                    run_is_stdout (command->table_path) || run_is_stdout (command->summary_path) ? stderr : stdout);
+  FILE *text = run_is_stdout (command->table_path) || run_is_stdout (command->summary_path) ? stderr : stdout;
+  pw_report_outputs (command, text);
+  pw_report_stated (command, text);
   if (error->status == PW_OK) pw_report_warnings (run, summary.energy_defect);
   int undrawn = run_finish_figures (command, summary.reason, error);
   if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
@@ -546,7 +546,7 @@ static int run_command (void *options, pw_error *error) {
   pw_comparison_close (&command->comparison);
   pw_error_run_close (&command->stated);
   pw_run_close (command->run);
-  pw_condition_close (command->condition);
+  pw_outcomes_close (&command->outcomes);
   free (command->redundant);
   pw_cli_engine_close (&command->engine);
   return status;
@@ -566,6 +566,7 @@ static const struct poptOption run_options[] = {
                   "What the colours of snapshots show: body (default) or time"),
   PW_TEXT_OPTION (pw_run_cli, page_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
   PW_FLAG_OPTION (pw_run_cli, with_energies, "energy", "Show energies, work and losses"),
+  PW_LIST_OPTION (pw_run_cli, of, "of", 0, "OUTPUT", "Print " PW_OUTPUT_HELP "; repeatable"),
   PW_UNTIL_OPTION,
   PW_FLAG_OPTION (pw_run_cli, with_error, "error",
                   "State the error, from a repetition with a tenth of the tolerance or half the step"),

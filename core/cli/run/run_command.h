@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include "motion.h"
+#include "outcome.h"
 #include "pinwheel-analysis.h"
 #include "plot.h"
 
@@ -48,6 +49,7 @@ typedef struct pw_run_cli {
   pw_cli_line line;
   const char *row_interval_text; /* --every */
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
+  const char **of;               /* ended by NULL; or NULL */
   int with_energies, with_error; /* 1: --energy, --error */
   pw_checkpoints checkpoints;
   /* as understood */
@@ -62,13 +64,12 @@ typedef struct pw_run_cli {
   pw_plots *plots;
   pw_comparison comparison;
   pw_error_run stated;
-  pw_condition *condition; /* of --until, or NULL */
-  pw_crossing crossing;
+  pw_outcomes outcomes; /* --of and --until; its system is NULL without them */
   pw_run *run;
   const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
   pw_progress progress;
   /* in progress */
-  double stop_time;            /* at which the condition has become true [s]; NaN: it has not */
+  int has_outputs;             /* 1: the run is complete, and the values of --of are known */
   long rows;                   /* written to the table */
   int limited;                 /* 1: --limit, --max-steps or a signal during a step has stopped the run */
   int loaded;                  /* 1: the state of the checkpoint has been loaded */
@@ -81,7 +82,7 @@ typedef struct pw_run_cli {
 
 /* The time at which the results end: that of --until, or that reached. */
 static inline double pw_run_end_time (const pw_run_cli *command) {
-  return command->condition && !isnan (command->stop_time) ? command->stop_time : pw_run_time (command->run);
+  return command->outcomes.ended ? command->outcomes.t : pw_run_time (command->run);
 }
 
 /* ---- The error (run_error.c); without --error these do nothing ---- */
@@ -104,6 +105,8 @@ enum { PW_RUN_REASON = 80 };
  * of an interruption. */
 pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
                            char reason[PW_RUN_REASON]);
+/* Prints the outputs of --of of a complete run, if any. */
+void pw_report_outputs (const pw_run_cli *command, FILE *f);
 /* Prints the last state, reactions, energies if they are asked for, errors, residuals and cost. */
 void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last);
 

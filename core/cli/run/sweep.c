@@ -426,7 +426,7 @@ static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
     return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
   if (pw_cli_check_csv (sweep->path, error) != PW_OK) return PW_INPUT;
   if (!sweep->merge && sweep->ranges == NULL)
-    return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
+    return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=LOW:HIGH[:COUNT][:log] or NAME=V1,V2,...");
   return sweep->merge ? PW_OK : pw_cli_at_most_one (&pw_cli_sweep, &sweep->line, error);
 }
 
@@ -544,7 +544,7 @@ static const struct poptOption sweep_options[] = {
   PW_OPTION_GROUP ("Sweep"),
   PW_LIST_OPTION (pw_sweep, ranges, "vary", 'v', "NAME=RANGE",
                   "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
-                  "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
+                  "RANGE: LOW:HIGH[:COUNT][:log], 11 values if no COUNT is given, or a list V1,V2,..."),
   PW_LIST_OPTION (pw_sweep, plan.of, "of", 0, "OUTPUT", "Add a column: " PW_OUTPUT_HELP "; repeatable"),
   PW_TEXT_OPTION (pw_sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
   PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),

@@ -12,15 +12,15 @@
  * Rows are numbered from 0 in the order of the table, in which the last axis varies fastest.  A sweep computes all
  * rows, or those of one part: part i of n has the rows i - 1, i - 1 + n, i - 1 + 2 n, ... */
 
+enum { PW_AXIS_VALUES = 11 /* of a range without COUNT */ };
 #define PW_GRID_MAX_ROWS 1e8 /* larger grids are refused: a journal needs 8 bytes of memory per row */
 
 /* A varied quantity: a parameter of the model or the initial value of a state. */
 typedef struct {
   char *name;
-  char *range; /* "lin:1:10:100", as written */
-  enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type;
-  double first, last;            /* of PW_AXIS_LIN and PW_AXIS_LOG */
-  double *value;                 /* of PW_AXIS_LIST */
+  char *text;                    /* of its values, "1:10:100" or "1,2,5", as written */
+  pw_range range;                /* without a list */
+  double *value;                 /* of a list; NULL: a range */
   long count;                    /* number of values */
   long stride;                   /* number of rows from one value to the next */
   const pw_parameter *parameter; /* NULL: the initial value of a state; set by pw_plan_open, like the unit */
@@ -33,7 +33,7 @@ typedef struct {
   long rows;
 } pw_grid;
 
-/* Reads "NAME=RANGE"; the arrays of the axis are in the arena.  PW_INPUT with the reason, PW_RESOURCE. */
+/* Reads "NAME=RANGE" or "NAME=V1,V2,..."; the arrays of the axis are in the arena.  PW_INPUT with the reason, PW_RESOURCE. */
 int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error);
 double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 

@@ -14,78 +14,53 @@ enum { PLAN_TRIES = 1000 }; /* failures to build a model after which no other va
 
 /* ---- Ranges ---- */
 
-/* Reads the finite number or expression in the first `size` bytes of a text, which it restores. */
-static int axis_read_number (char *text, size_t size, double *value) {
-  const char after = text[size];
-  text[size] = 0;
-  int status = pw_read_expression (text, value);
-  text[size] = after;
-  return status == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
-}
-
 static int axis_fail (const pw_axis *axis, const char *why, pw_error *error) {
-  return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", axis->name, axis->range, why);
+  return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", axis->name, axis->text, why);
 }
 
-/* The length of the first value of a list, which ends at a comma outside parentheses. */
-static size_t axis_value_length (const char *list) {
-  size_t n = 0;
-  for (int depth = 0; list[n] && (list[n] != ',' || depth > 0); n++) depth += (list[n] == '(') - (list[n] == ')');
-  return n;
-}
-
-/* "NAME=V1,V2,...", "NAME=lin:FIRST:LAST:COUNT" or "NAME=log:FIRST:LAST:COUNT" */
+/* "NAME=V1,V2,..." or "NAME=LOW:HIGH[:COUNT][:log]" */
 int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error) {
   *axis = (pw_axis){ .name = pw_arena_copy (arena, text) };
   if (axis->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   char *equals = strchr (axis->name, '=');
   if (equals == NULL || equals == axis->name || equals[1] == 0)
-    return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,...",
+    return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=LOW:HIGH[:COUNT][:log] or a list NAME=V1,V2,...",
                     text);
-  *equals = 0, axis->range = equals + 1;
-  axis->type = strncmp (axis->range, "lin:", 4) == 0   ? PW_AXIS_LIN
-               : strncmp (axis->range, "log:", 4) == 0 ? PW_AXIS_LOG
-                                                       : PW_AXIS_LIST;
-  const int is_list = axis->type == PW_AXIS_LIST;
-  double number[3], *value = number;
-  char *c = is_list ? axis->range : strchr (axis->range, ':') + 1;
-  axis->count = is_list ? 1 : 3; /* numbers that are read */
-  if (is_list && strchr (c, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
-  for (const char *d = c; is_list && *(d += axis_value_length (d)); d++) axis->count++;
-  if (is_list) value = axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
-  if (value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (long i = 0; i < axis->count; i++) {
-    size_t n = is_list ? axis_value_length (c) : strcspn (c, ":");
-    const char *why = is_list ? PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c)
-                              : PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
-    if (axis_read_number (c, n, value + i) != PW_OK || (!is_list && (c[n] == ':') != (i < 2)))
-      return axis_fail (axis, why, error);
-    c += n + 1;
+  *equals = 0, axis->text = equals + 1;
+  if (axis->text[pw_cli_part (axis->text, ':')]) {
+    if (pw_cli_range ("--vary", text, &axis->range, error) != PW_OK) return error->status;
+    const int one = axis->range.low == axis->range.high;
+    axis->count = axis->range.count ? axis->range.count : one ? 1 : PW_AXIS_VALUES;
+    if (axis->count > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
+    if (axis->count == 1 && !one)
+      return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
+    return PW_OK;
   }
-  if (is_list) return PW_OK;
-  axis->first = number[0], axis->last = number[1];
-  if (*pw_domain_check (PW_COUNT, number[2]))
-    return axis_fail (axis, "expected a count that is a whole number >= 1", error);
-  if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
-  axis->count = (long)number[2];
-  if (axis->count == 1 && axis->first != axis->last)
-    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
-  if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
-    return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
+  axis->count = 1;
+  for (const char *c = axis->text; c[pw_cli_part (c, ',')]; axis->count++) c += pw_cli_part (c, ',') + 1;
+  axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
+  if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const char *c = axis->text;
+  for (long i = 0; i < axis->count; i++, c += pw_cli_part (c, ',') + 1) {
+    const size_t size = pw_cli_part (c, ',');
+    const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
+    if (pw_read_expression (part, &axis->value[i]) != PW_OK || !isfinite (axis->value[i]))
+      return axis_fail (axis, PW_PRINTED (140, "\"%s\" is not a finite number", part), error);
+  }
   return PW_OK;
 }
 
 /* The ends are exact.  Values between them are divided only once, so that they are rounded as little as possible: the
- * fourth value of lin:0:1:11 is 0.3. */
+ * fourth value of 0:1:11 is 0.3. */
 double pw_axis_value (const pw_axis *axis, long i) {
-  if (axis->type == PW_AXIS_LIST) return axis->value[i];
-  double last = (double)(axis->count - 1), k = (double)i;
-  if (i == 0 || axis->first == axis->last) return axis->first;
-  if (i == axis->count - 1) return axis->last;
-  if (axis->type == PW_AXIS_LOG) return pow (10, (log10 (axis->first) * (last - k) + log10 (axis->last) * k) / last);
-  double value = (axis->first * (last - k) + axis->last * k) / last;
+  if (axis->value) return axis->value[i];
+  const double low = axis->range.low, high = axis->range.high, last = (double)(axis->count - 1), k = (double)i;
+  if (i == 0 || low == high) return low;
+  if (i == axis->count - 1) return high;
+  if (axis->range.logarithmic) return pow (10, (log10 (low) * (last - k) + log10 (high) * k) / last);
+  double value = (low * (last - k) + high * k) / last;
   if (isfinite (value)) return value;
-  return axis->first / last * (last - k) + axis->last / last * k; /* the products were too large */
+  return low / last * (last - k) + high / last * k; /* the products were too large */
 }
 
 /* ---- The grid ---- */
@@ -358,7 +333,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
   pw_fingerprint_initial (text, plan->line->starts);
   pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
   for (int i = 0; i < plan->grid.axes; i++) {
-    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
+    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].text);
     pw_text_cell (&order, plan->grid.axis[i].name);
   }
   text->failed |= order.failed;
