@@ -129,12 +129,13 @@ typedef struct {
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
   const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width, *until;
-  pw_cli_model m; /* opened by pw_cli_open */
-  pw_files files; /* opened by pw_files_open */
+  const char *table, *json, *plots; /* -o, --json, --plots of PW_RESULTS_OPTIONS */
+  pw_cli_model m;                   /* opened by pw_cli_open */
+  pw_files files;                   /* opened by pw_files_open */
   pw_arena arena;
   /* private */
   poptContext popt;
-  struct poptOption *table; /* a copy of the command's options, bound to its structure */
+  struct poptOption *options; /* a copy of the command's options, bound to its structure */
   void **text;              /* the text or list that popt allocated for each option */
 } pw_cli_line;
 
@@ -334,14 +335,17 @@ int pw_files_finish (pw_cli_line *line, pw_error *error);
 /* Removes files that have not been completed, and closes the folder. */
 void pw_files_close (pw_files *files);
 
-/* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */
-int pw_cli_check_csv (const char *path, pw_error *error);
+/* Writes the table that `csv` writes to a file in the format that the ending of its path states: .csv; .npz, a NumPy
+ * archive with a vector of each column of numbers; or .json, an object with a list of each column.  Statuses of csv,
+ * PW_RESOURCE. */
+int pw_cli_write_table (const char *path, FILE *f, const void *context,
+                        int (*csv) (const void *context, FILE *f, pw_error *error), pw_error *error);
 /* Whether a name ends as that of a file: ".csv", ".png", ... */
 int pw_cli_names_file (const char *path);
 /* Refuses a file in a format that is not written, and a new folder with the name of a file.  A status. */
 int pw_cli_check_format (const pw_use *use, pw_error *error);
 /* Endings of formats, for pw_use. */
-extern const char *const pw_cli_csv[], *const pw_cli_json[];
+extern const char *const pw_cli_csv[], *const pw_cli_json[], *const pw_cli_tables[];
 
 /* ---- JSON ---- */
 

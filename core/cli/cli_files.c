@@ -1,6 +1,7 @@
 /* The files that a command reads and writes: checks, folders, those kept open until it ends. */
 #define _GNU_SOURCE /* memmem */
 #include <errno.h>
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,7 +29,8 @@ static int files_check_table (void *context, const char *path) {
   return pw_check_paths (check->use, check->count, check->error);
 }
 
-const char *const pw_cli_csv[] = { ".csv", NULL }, *const pw_cli_json[] = { ".json", NULL };
+const char *const pw_cli_csv[] = { ".csv", NULL }, *const pw_cli_json[] = { ".json", NULL },
+                  *const pw_cli_tables[] = { ".csv", ".npz", ".json", NULL };
 
 /* The ending of a file's name that states its format, such as ".csv"; NULL for another ending, such as ".5". */
 static const char *files_format (const char *path) {
@@ -87,11 +89,83 @@ int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error
   return status;
 }
 
-int pw_cli_check_csv (const char *path, pw_error *error) {
-  const char *ending = path ? strrchr (path, '.') : NULL;
-  if (ending == NULL || strcasecmp (ending, ".npz") != 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "-o %s: this command writes no NumPy archives: expected a name that ends in .csv",
-                  path);
+/* ---- Tables ---- */
+
+/* Moves *at past a cell, and stores its text without quotes, which are doubled inside; returns what ends the cell. */
+static char table_cell (const char **at, pw_text *cell) {
+  const char *c = *at;
+  const int quoted = *c == '"';
+  pw_text_clear (cell);
+  for (c += quoted; *c && (quoted || (*c != ',' && *c != '\n')); c++) {
+    if (quoted && *c == '"' && *++c != '"') break;
+    pw_text_add_bytes (cell, c, 1);
+  }
+  const char end = *c;
+  *at = c + (end != 0);
+  return end;
+}
+
+/* Column k of a table without its heading: stores the numbers, NaN for empty cells and texts; returns 1 if there are
+ * only numbers.  With j, the cells are written as items of JSON. */
+static int table_column (const char *rows, int k, double *value, pw_json *j, pw_text *cell) {
+  int numbers = 1, i = 0;
+  for (const char *at = rows; *at; i++) {
+    char end = ',';
+    for (int c = 0; c <= k && end == ','; c++) end = table_cell (&at, cell);
+    const char *text = cell->chars ? cell->chars : "";
+    value[i] = NAN;
+    const int is_number = pw_read_number (text, &value[i]) == PW_OK;
+    numbers &= is_number || *text == 0;
+    if (j && (is_number || *text == 0)) pw_json_number (j, NULL, value[i]);
+    if (j && !is_number && *text) pw_json_text (j, NULL, text);
+    while (end == ',') end = table_cell (&at, cell);
+  }
+  return numbers;
+}
+
+/* Writes a CSV table as NPZ or JSON. */
+static int table_convert (const char *csv, int is_json, FILE *f, pw_error *error) {
+  const int is_npz = !is_json;
+  const char *rows = strchr (csv, '\n') ? strchr (csv, '\n') + 1 : "", *at = csv;
+  pw_text name = { .chars = NULL }, cell = { .chars = NULL };
+  pw_npz z = { .f = f };
+  pw_json j = { .f = f, .lines = 1 };
+  long count = 0;
+  for (const char *c = rows; *c; c++) count += *c == '\n';
+  double *value = malloc (((size_t)count + 1) * sizeof *value);
+  if (is_json) pw_json_open (&j, NULL, '{');
+  for (int k = 0; value && at < rows; k++) {
+    table_cell (&at, &name);
+    const char *text = name.chars ? name.chars : "";
+    if (is_json) pw_json_open (&j, text, '[');
+    const int numbers = table_column (rows, k, value, is_json ? &j : NULL, &cell);
+    if (is_json) pw_json_close (&j, ']');
+    if (is_npz && numbers)
+      pw_npz_add (&z, PW_PRINTED (300, "%.*s", (int)(strstr (text, " [") ? strstr (text, " [") - text : 299), text),
+                  count, -1, 1, value);
+  }
+  if (is_json) pw_json_close (&j, '}');
+  const int failed = value == NULL || name.failed || cell.failed;
+  pw_text_free (&name);
+  pw_text_free (&cell);
+  free (value);
+  int status = is_npz ? pw_npz_end (&z, error) : PW_OK;
+  return failed ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
+}
+
+int pw_cli_write_table (const char *path, FILE *f, const void *context,
+                        int (*csv) (const void *context, FILE *f, pw_error *error), pw_error *error) {
+  const char *ending = files_format (path);
+  const int is_npz = ending && strcasecmp (ending, ".npz") == 0, is_json = ending && strcasecmp (ending, ".json") == 0;
+  if (!is_npz && !is_json) return csv (context, f, error);
+  pw_stream text;
+  FILE *memory = pw_stream_open (&text);
+  int status = memory ? csv (context, memory, error) : PW_OK;
+  if (pw_stream_close (memory, &text) != PW_OK && status == PW_OK)
+    status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = table_convert (text.text, is_json, f, error);
+  free (text.text);
+  return status;
 }
 
 /* ---- Folders ---- */

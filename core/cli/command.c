@@ -25,28 +25,28 @@ static int command_is_end (const struct poptOption *o) {
 static int command_bind (pw_cli_line *line, const struct poptOption *options) {
   size_t n = 0;
   while (!command_is_end (options + n)) n++;
-  line->table = calloc (n + 2, sizeof *line->table);
+  line->options = calloc (n + 2, sizeof *line->options);
   line->text = calloc (n + 2, sizeof *line->text);
-  if (line->table == NULL || line->text == NULL) return PW_RESOURCE;
+  if (line->options == NULL || line->text == NULL) return PW_RESOURCE;
   n = 0;
   for (const struct poptOption *o = options; !command_is_end (o); o++) {
     if (o->longName == NULL) continue; /* a heading */
-    line->table[n] = *o;
-    line->table[n].arg = (char *)line + (size_t)o->arg;
-    line->table[n].val = (int)n + 1;
+    line->options[n] = *o;
+    line->options[n].arg = (char *)line + (size_t)o->arg;
+    line->options[n].val = (int)n + 1;
     n++;
   }
-  line->table[n] = command_help_option;
+  line->options[n] = command_help_option;
   return PW_OK;
 }
 
 /* Keeps the text or list that popt has allocated for option i, to release it even if the member of the structure
  * changes.  If an option is repeated, a list grows; a text is refused, under either name of the option. */
 static int command_keep (const pw_command *command, pw_cli_line *line, int i, pw_error *error) {
-  const struct poptOption *o = line->table + i;
+  const struct poptOption *o = line->options + i;
   unsigned type = o->argInfo & POPT_ARG_MASK;
   int given = 0;
-  for (int j = 0; line->table[j].longName; j++) given |= line->table[j].arg == o->arg && line->text[j] != NULL;
+  for (int j = 0; line->options[j].longName; j++) given |= line->options[j].arg == o->arg && line->text[j] != NULL;
   if (type == POPT_ARG_STRING) free (line->text[i]);
   if (type == POPT_ARG_STRING || type == POPT_ARG_ARGV) line->text[i] = *(void **)o->arg;
   if (type != POPT_ARG_STRING || !given) return PW_OK;
@@ -89,7 +89,7 @@ static int command_refuse (const pw_command *command, const pw_cli_line *line, i
   if (code != POPT_ERROR_BADOPT)
     return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
   pw_nearest near = { .sought = PW_PRINTED (100, "%.*s", (int)strcspn (name, "="), name) };
-  for (const struct poptOption *o = line->table; o->longName; o++)
+  for (const struct poptOption *o = line->options; o->longName; o++)
     if (o->descrip) pw_nearest_try (&near, o->longName);
   const char *hint = near.near ? PW_PRINTED (140, "did you mean \"--%s\"?", near.best)
                                : PW_PRINTED (140, "see pinwheel %s --help", command->name);
@@ -106,7 +106,7 @@ int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_e
 /* Reads the command line.  PW_OK; 1 if help was requested and has been printed; or a negative status. */
 static int command_read (const pw_command *command, pw_cli_line *line, int argc, const char **argv, pw_error *error) {
   errno = 0;
-  if (command_bind (line, command->options) == PW_OK) line->popt = poptGetContext (argv[0], argc, argv, line->table, 0);
+  if (command_bind (line, command->options) == PW_OK) line->popt = poptGetContext (argv[0], argc, argv, line->options, 0);
   if (line->popt == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int number = poptGetNextOpt (line->popt);
   for (; number > 0 && number != COMMAND_HELP; number = poptGetNextOpt (line->popt))
@@ -130,14 +130,14 @@ static void command_close (pw_cli_line *line) {
   pw_files_close (&line->files);
   pw_arena_free (&line->arena);
   pw_cli_close_model (&line->m);
-  for (size_t i = 0; line->table && line->text && line->table[i].longName; i++) {
-    char **list = (line->table[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? line->text[i] : NULL;
+  for (size_t i = 0; line->options && line->text && line->options[i].longName; i++) {
+    char **list = (line->options[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? line->text[i] : NULL;
     for (; list && *list; list++) free (*list);
     free (line->text[i]);
   }
   if (line->popt) poptFreeContext (line->popt);
   free (line->text);
-  free (line->table);
+  free (line->options);
   free (line);
 }
 

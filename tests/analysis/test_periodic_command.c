@@ -331,7 +331,7 @@ TEST (bad) {
     { "pendulum",
       "pendulum: no signal has a known period (those of expressions and tables are not known): give --period T, or "
       "--period free if no signal changes with time" },
-    { "snakeboard --vary m=1", "--vary m=1: expected NAME=FIRST:LAST" },
+    { "snakeboard --vary m=1", "--vary m=1: expected NAME=LOW:HIGH[:COUNT][:log], numbers" },
     { "snakeboard --vary m=0:1", "--vary m=0:1: expected a number > 0" },
     { "snakeboard --vary mm=1:3", "model snakeboard has no parameter \"mm\"; did you mean \"m\"?" },
     { "chain --set n=200 --period 1", "model chain has 600 coordinates; periodic motions are sought with at most 100" },

@@ -841,7 +841,8 @@ static void fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json_print (j, "]}");
 }
 
-static int fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
+static int fit_table (const void *context, FILE *f, pw_error *error) {
+  const pw_fit *fit = context;
   static const char *const part[] = { "", ".model", ".residual", ".sigma" };
   pw_text t = { .chars = NULL };
   pw_text_name (&t, "t", "s");
@@ -910,7 +911,6 @@ static int fit_options (pw_fit *fit, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--starts", fit->starts_text, PW_COUNT, &starts, error);
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
   fit->starts = (int)starts;
-  if (status == PW_OK) status = pw_cli_check_csv (fit->table_path, error);
   if (status == PW_OK)
     status = pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
   return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
@@ -920,7 +920,7 @@ static int fit_open (pw_fit *fit, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--data", fit->data_path, PW_READS, NULL },
-                   { "-o", fit->table_path, PW_WRITES, pw_cli_csv },
+                   { "-o", fit->table_path, PW_WRITES, pw_cli_tables },
                    { "--json", fit->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
   int status = fit_options (fit, error);
@@ -946,7 +946,7 @@ static int fit_finish (pw_fit *fit, pw_error *error) {
   pw_unknowns_report (&fit->unknowns, fit->estimate);
   const int drawn = fit->plots_path ? fit_draw (fit, &drawing) : PW_OK;
   const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
-  int status = table ? fit_table (fit, table, error) : PW_OK;
+  int status = table ? pw_cli_write_table (fit->table_path, table, fit, fit_table, error) : PW_OK;
   if (summary) fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
   if (status == PW_OK) status = pw_files_finish (&fit->line, error);
   status = pw_figure_status (drawn, &drawing, status, error);
@@ -986,7 +986,8 @@ static const struct poptOption fit_options_table[] = {
   PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
                   "Search from N points: the initial values, and others between the bounds (default 1)"),
   PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
-  PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
+  PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv",
+                  "Write data, model values and residuals, or as FILE.npz or FILE.json"),
   PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
   PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
   PW_WIDTH_OPTION,

@@ -12,7 +12,7 @@
 typedef struct {
   pw_cli_line line;
   const char *t_text;                       /* of --at */
-  const char *name;                         /* of -o, for the files NAME.json, NAME.csv, NAME.npz; or NULL */
+  const char *name, *json_path;             /* of -o and --json, or NULL */
   const char *page_path;                    /* of --animate, or NULL */
   const char **hold_texts;                  /* of --hold */
   int steady;                               /* 1: --steady */
@@ -446,18 +446,31 @@ static int linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *e
 /* Indices in the list of files of linearise_open_files; 0 is the model. */
 enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
 
-/* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
+/* Opens the files before anything is computed.  -o NAME, an old spelling, stands for NAME.json, .csv and .npz. */
 static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
   enum { PATH = 4096 };
-  const char *name = cmd->name, *slash = name ? strrchr (name, '/') : NULL, *last = slash ? slash + 1 : name;
-  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0 || pw_cli_names_file (last)))
-    return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", name);
-  if (name && strlen (name) + sizeof ".json" > PATH) return pw_fail (error, PW_INPUT, "-o: the name is too long");
+  static const char *const ending[] = { ".json", ".csv", ".npz" };
+  const char *name = cmd->name, *slash = name ? strrchr (name, '/') : NULL, *last = slash ? slash + 1 : name,
+             *format = name ? strrchr (last, '.') : NULL, *path[3] = { cmd->json_path };
+  int found = 0;
+  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0 || strlen (name) > PATH - 10))
+    return pw_fail (error, PW_INPUT, "-o %.200s: expected the name of a file, .csv, .npz or .json", name);
+  for (int i = 0; i < 3 && format; i++)
+    if (strcmp (format, ending[i]) == 0) path[i] = name, found = 1;
+  if (name && !found && pw_cli_names_file (last))
+    return pw_fail (error, PW_INPUT, "-o %.200s: expected a name that ends in .csv, .npz or .json", name);
+  if (name && !found) {
+    path[0] = pw_arena_copy (&cmd->line.arena, PW_PRINTED (PATH, "%s.json", name));
+    path[1] = pw_arena_copy (&cmd->line.arena, PW_PRINTED (PATH, "%s.csv", name));
+    path[2] = pw_arena_copy (&cmd->line.arena, PW_PRINTED (PATH, "%s.npz", name));
+    if (path[0] == NULL || path[1] == NULL || path[2] == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    pw_cli_say ("pinwheel: -o %s: an old spelling, which writes %s, %s and %s\n", name, path[0], path[1], path[2]);
+  }
   if (cmd->page_path && pw_animation_check ("--animate", cmd->page_path, error) != PW_OK) return error->status;
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", name ? PW_PRINTED (PATH, "%s.json", name) : NULL, PW_WRITES, NULL },
-                   { "-o", name ? PW_PRINTED (PATH, "%s.csv", name) : NULL, PW_WRITES, NULL },
-                   { "-o", name ? PW_PRINTED (PATH, "%s.npz", name) : NULL, PW_WRITES, NULL },
+                   { path[0] == cmd->json_path ? "--json" : "-o", path[0], PW_WRITES, NULL },
+                   { "-o", path[1], PW_WRITES, NULL },
+                   { "-o", path[2], PW_WRITES, NULL },
                    { "--animate", cmd->page_path, PW_WRITES, NULL } };
   return pw_files_open (&cmd->line, use, sizeof use / sizeof *use, error);
 }
@@ -482,11 +495,11 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK && cmd->linear.unknowns == 0)
     status = pw_fail (error, PW_INPUT, "%s has no degrees of freedom: there is nothing to linearise", model);
   if (status == PW_OK) linearise_print (cmd);
-  if (status == PW_OK && cmd->name) {
-    linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->line, LINEARISE_JSON), .lines = 1 });
-    status = linearise_csv (cmd, pw_files_stream (&cmd->line, LINEARISE_CSV), error);
-    if (status == PW_OK) status = linearise_npz (cmd, pw_files_stream (&cmd->line, LINEARISE_NPZ), error);
-  }
+  FILE *json = pw_files_stream (&cmd->line, LINEARISE_JSON), *csv = pw_files_stream (&cmd->line, LINEARISE_CSV),
+       *npz = pw_files_stream (&cmd->line, LINEARISE_NPZ);
+  if (status == PW_OK && json) linearise_json (cmd, &(pw_json){ .f = json, .lines = 1 });
+  if (status == PW_OK && csv) status = linearise_csv (cmd, csv, error);
+  if (status == PW_OK && npz) status = linearise_npz (cmd, npz, error);
   if (status == PW_OK && cmd->page_path)
     status = linearise_page (cmd, pw_files_stream (&cmd->line, LINEARISE_PAGE), error);
   if (status == PW_OK) status = pw_files_finish (&cmd->line, error);
@@ -510,8 +523,9 @@ static const struct poptOption linearise_options[] = {
                   "Input u: the signal of a force, ELEMENT or ELEMENT.FIELD; repeatable (default all)"),
   PW_LIST_OPTION (pw_linearise_command, output_names, "output", 0, "STATE",
                   "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
-  PW_TEXT_OPTION (pw_linearise_command, name, "name", 'o', "NAME",
-                  "Write NAME.json (everything), NAME.csv (the matrix [A B; C D]) and NAME.npz for NumPy"),
+  PW_TEXT_OPTION (pw_linearise_command, name, "name", 'o', "FILE",
+                  "Write FILE.csv (the matrix [A B; C D]), FILE.npz for NumPy or FILE.json"),
+  PW_TEXT_OPTION (pw_linearise_command, json_path, "json", 0, "FILE", "Write everything as JSON"),
   PW_TEXT_OPTION (pw_linearise_command, page_path, "animate", 0, "FILE.html",
                   "Write a page in which the modes are animated"),
   PW_LIMIT_OPTION,

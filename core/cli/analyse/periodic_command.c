@@ -18,7 +18,7 @@ enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each from the state af
 
 typedef struct {
   pw_cli_line line;
-  const char *period_text, *periods_text, *guess_text, *vary_text, *folder;
+  const char *period_text, *periods_text, *guess_text, *vary_text;
   pw_limit limit;
   pw_periodic_settings settings;
   const char *source; /* of the period: "of the signals", "--period", "found" */
@@ -363,7 +363,7 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
   pw_states_header (s, &t);
   pw_complex_header (&t, multipliers, "");
-  int status = pw_text_line (&t, f, cmd->folder, error);
+  int status = pw_text_line (&t, f, cmd->line.table, error);
   for (const pw_periodic_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
     const pw_periodic_orbit *o = &p->orbit;
     const periodic_displacement d = periodic_displace (o);
@@ -374,7 +374,7 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
     for (int i = 0; i < states; i++)
       if (!pw_system_state_hidden (s, i)) pw_text_number (&t, p->state[i]);
     pw_complex_cells (&t, o->re, o->im, o->multipliers, multipliers);
-    status = pw_text_line (&t, f, cmd->folder, error);
+    status = pw_text_line (&t, f, cmd->line.table, error);
   }
   return status;
 }
@@ -488,13 +488,12 @@ static void periodic_draw_multipliers (const pw_periodic_command *cmd, pw_curves
   }
 }
 
-static int periodic_write (const pw_periodic_command *cmd, pw_error *error) {
+static int periodic_draw (const pw_periodic_command *cmd, pw_error *error) {
   const double range[] = { fmin (cmd->settings.first, cmd->settings.last),
                            fmax (cmd->settings.first, cmd->settings.last) };
   const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
   pw_curves c;
-  int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
-  if (status == PW_OK) status = pw_curves_open (&c, &cmd->line, cmd->folder, "periodic", title, error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "periodic", title, error);
   if (status != PW_OK) return status;
   if (cmd->vary_text)
     periodic_draw_branch (cmd, &c, range);
@@ -510,7 +509,7 @@ static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "periodic", error);
+  if (status == PW_OK) status = pw_results_open (&cmd->line, "periodic", 1, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m), pw_cli_report_tables (cmd->line.m.system, cmd->settings.period);
   if (status == PW_OK) {
     pw_periodic_orbit o;
@@ -527,7 +526,9 @@ static int periodic_command (void *options, pw_error *error) {
   }
   if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
   if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
-  if (status == PW_OK && cmd->points && cmd->folder) status = periodic_write (cmd, error);
+  if (status == PW_OK && cmd->points)
+    status = pw_results_write (&cmd->line, 1, cmd, periodic_csv, periodic_json, error);
+  if (status == PW_OK && cmd->points && cmd->line.plots) status = periodic_draw (cmd, error);
   for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
   free (cmd->point);
   pw_periodic_close (cmd->search);
@@ -543,9 +544,7 @@ static const struct poptOption periodic_options_table[] = {
   PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
                   "First guess of a free period [s] (default: the time of the first return)"),
   PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=LOW:HIGH", "Follow the motion over a parameter"),
-  PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
-                  "Write periodic.csv, periodic.json and a figure into a folder"),
-  PW_WIDTH_OPTION,
+  PW_RESULTS_OPTIONS ("Write the motion or branch as a table", "Write the results", "Draw a figure"),
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
   PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
   PW_LIMIT_OPTION,

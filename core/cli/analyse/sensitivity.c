@@ -21,7 +21,7 @@ typedef struct {
   pw_cli_line line;
   const char **by; /* of --by, ended by NULL */
   const char **of; /* of --of, ended by NULL */
-  const char *every, *folder, *jobs_text;
+  const char *every, *jobs_text;
   pw_unknowns unknowns;   /* P of them */
   pw_run_outputs outputs; /* method NULL: the run itself; set by sensitivity_prepare for the runs that are compared */
   int jobs;               /* threads */
@@ -306,7 +306,7 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
                         PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", cmd->outputs.of[o], cmd->unknowns.list[p].name),
                         sensitivity_unit (cmd, o, p, unit));
   }
-  int status = pw_text_line (&t, f, cmd->folder, error);
+  int status = pw_text_line (&t, f, cmd->line.table, error);
   for (int i = 0; i < cmd->outputs.rows && status == PW_OK; i++) {
     pw_text_number (&t, cmd->outputs.t[i]);
     for (int o = 0; o < cmd->outputs.count; o++) {
@@ -314,7 +314,7 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
       pw_text_number (&t, cmd->table[o * cmd->outputs.rows + i]);
       for (int p = 0; p < cmd->unknowns.count; p++) pw_text_number (&t, sensitivity_of (cmd, o, p, i)->value);
     }
-    status = pw_text_line (&t, f, cmd->folder, error);
+    status = pw_text_line (&t, f, cmd->line.table, error);
   }
   return status;
 }
@@ -324,7 +324,7 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
 static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, cmd->folder, "sensitivity", "derivatives along the run", error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "sensitivity", "derivatives along the run", error);
   if (status != PW_OK) return status;
   for (int o = 0; o < cmd->outputs.count; o++) {
     char label[300], unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
@@ -352,7 +352,8 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_engine (&cmd->unknowns, SENSITIVITY_RUNS, 1, error);
   if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->jobs, error);
-  if (status == PW_OK) status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
+  if (status == PW_OK)
+    status = pw_cli_requires ("--every", cmd->every, "-o FILE", cmd->line.table || cmd->line.plots, error);
   if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &every, error);
   if (status != PW_OK) return status;
   if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
@@ -363,7 +364,8 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   while (cmd->of[cmd->outputs.count]) cmd->outputs.count++;
   if (cmd->line.until && cmd->every)
     return pw_fail (error, PW_INPUT, "--every cannot be given together with --until: there is no table");
-  if (cmd->folder && !cmd->line.until) { /* the table has rows from 0 to the end, whose times must not vary */
+  if ((cmd->line.table || cmd->line.plots) &&
+      !cmd->line.until) { /* the table has rows from 0 to the end, whose times must not vary */
     const double t_end = cmd->unknowns.settings.span;
     if (every == 0) every = t_end / SENSITIVITY_ROWS;
     const double count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
@@ -379,9 +381,8 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
 
 static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
-  const char *folder = cmd->folder;
   int status = sensitivity_open (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, folder, "sensitivity", error);
+  if (status == PW_OK) status = pw_results_open (&cmd->line, "sensitivity", cmd->line.until == NULL, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = pw_report_initial_state (&cmd->line.m, cmd->unknowns.limit, error);
   if (status == PW_OK) {
@@ -395,10 +396,8 @@ static int sensitivity_command (void *options, pw_error *error) {
     cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   }
   if (status == PW_OK) sensitivity_print (cmd), sensitivity_warn (cmd);
-  if (status == PW_OK && folder)
-    status = pw_figure_write_tables (folder, "sensitivity", 5, cmd, cmd->line.until ? NULL : sensitivity_csv,
-                                     sensitivity_json, error);
-  if (status == PW_OK && folder && cmd->outputs.rows > 1) status = sensitivity_draw (cmd, error);
+  if (status == PW_OK) status = pw_results_write (&cmd->line, 5, cmd, sensitivity_csv, sensitivity_json, error);
+  if (status == PW_OK && cmd->line.plots && cmd->outputs.rows > 1) status = sensitivity_draw (cmd, error);
   pw_outcomes_close (&cmd->outcomes);
   pw_unknowns_close (&cmd->unknowns);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;
@@ -411,11 +410,9 @@ static const struct poptOption sensitivity_options[] = {
                   "A parameter, or the initial value of a state, such as body.vx; repeatable"),
   PW_TEXT_OPTION (sensitivity, every, "every", 0, "DT",
                   "Time between rows of the table [s] (default a thousandth of the final time)"),
-  PW_TEXT_OPTION (sensitivity, folder, "output", 'o', "DIR",
-                  "Write sensitivity.csv (outputs and derivatives along the run), sensitivity.json and a figure into a "
-                  "folder; with --until sensitivity.json alone"),
+  PW_RESULTS_OPTIONS ("Write outputs and derivatives along the run as a table", "Write the results",
+                      "Draw a figure of the table"),
   PW_TEXT_OPTION (sensitivity, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
-  PW_WIDTH_OPTION,
   PW_METHOD_OPTIONS,
   PW_UNTIL_OPTION,
   PW_MODEL_OPTIONS,

@@ -22,7 +22,7 @@ enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */
 
 typedef struct {
   pw_cli_line line;
-  const char **hold_texts, *vary_text, *starts_text, *at_text, *folder;
+  const char **hold_texts, *vary_text, *starts_text, *at_text;
   pw_limit limit;
   pw_steady_settings settings;
   pw_initial_value hold[PW_HOLDS]; /* settings.holds values */
@@ -475,7 +475,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   pw_text_cell (&t, "growing,residual");
   pw_states_header (s, &t);
   pw_complex_header (&t, most, "1/s");
-  int status = pw_text_line (&t, f, cmd->folder, error);
+  int status = pw_text_line (&t, f, cmd->line.table, error);
   for (const pw_steady_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
     pw_text_number (&t, p->branch);
     pw_text_cell (&t, steady_events[p->motion.event]);
@@ -485,7 +485,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
     for (int i = 0; i < states; i++)
       if (!pw_system_state_hidden (s, i)) pw_text_number (&t, p->state[i]);
     pw_complex_cells (&t, p->linear.re, p->linear.im, p->linear.unknowns, most);
-    status = pw_text_line (&t, f, cmd->folder, error);
+    status = pw_text_line (&t, f, cmd->line.table, error);
   }
   return status;
 }
@@ -535,7 +535,7 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
   double re[2], im[2];
   pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, cmd->folder, "steady", "eigenvalues of steady motions", error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "steady", "eigenvalues of steady motions", error);
   if (status != PW_OK) return status;
   steady_ranges (cmd, re, im);
   for (int part = REAL; part <= IMAGINARY; part++) {
@@ -610,13 +610,13 @@ static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "steady", error);
+  if (status == PW_OK) status = pw_results_open (&cmd->line, "steady", 1, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = steady_compute (cmd, error);
   if (status == PW_OK && cmd->points) {
     steady_print (cmd);
-    if (cmd->folder) status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
-    if (status == PW_OK && cmd->folder && cmd->vary_text) status = steady_draw (cmd, error);
+    status = pw_results_write (&cmd->line, 1, cmd, steady_csv, steady_json, error);
+    if (status == PW_OK && cmd->line.plots && cmd->vary_text) status = steady_draw (cmd, error);
   }
   steady_forget (cmd, 0);
   free (cmd->point);
@@ -633,9 +633,7 @@ static const struct poptOption steady_options_table[] = {
   PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
                   "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
   PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
-  PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
-                  "Write steady.csv, steady.json and, with --vary, figures into a folder"),
-  PW_WIDTH_OPTION,
+  PW_RESULTS_OPTIONS ("Write the motions as a table", "Write the results", "With --vary, draw figures"),
   PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

@@ -39,32 +39,50 @@ pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error 
   return o;
 }
 
-int pw_figure_lock_folder (pw_cli_line *line, const char *folder, const char *name, pw_error *error) {
-  static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
+enum { RESULTS_PLOTS = 1, RESULTS_TABLE, RESULTS_JSON }; /* files of a command; 0 is the model */
+
+/* Understands -o DIR. */
+static int results_old_spelling (pw_cli_line *line, const char *name, int has_table, pw_error *error) {
+  const char *folder = line->table;
+  if (folder == NULL || strcmp (folder, "-") == 0 || pw_cli_names_file (folder)) return PW_OK;
+  if (line->plots || line->json)
+    return pw_fail (error, PW_INPUT, "-o %.200s: expected a name that ends in .csv, .npz or .json", folder);
+  line->plots = folder;
+  line->json = pw_arena_copy (&line->arena, PW_PRINTED (FIGURE_PATH + 40, "%.4000s/%s.json", folder, name));
+  line->table = pw_arena_copy (&line->arena, PW_PRINTED (FIGURE_PATH + 40, "%.4000s/%s.csv", folder, name));
+  if (line->json == NULL || line->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_cli_say ("pinwheel: -o %s: an old spelling of %s%s --json %s --plots %s\n", folder, has_table ? "-o " : "",
+              has_table ? line->table : "", line->json, folder);
+  if (!has_table) line->table = NULL;
+  return PW_OK;
+}
+
+int pw_results_open (pw_cli_line *line, const char *name, int has_table, pw_error *error) {
+  static const char *const ending[] = { ".dat", ".gp", ".svg", ".png", ".pdf" };
   enum { ENDINGS = sizeof ending / sizeof *ending };
   char text[ENDINGS][40];
   const char *names[ENDINGS + 1] = { NULL };
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
-  if (folder == NULL) return pw_cli_requires ("--width", line->width, "-o DIR", 0, error);
-  return pw_files_open (line, use, 2, error);
+  if (results_old_spelling (line, name, has_table, error) != PW_OK) return error->status;
+  if (!has_table && line->table) return pw_fail (error, PW_INPUT, "-o %.200s: there is no table", line->table);
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--plots", line->plots, PW_WRITES_INTO, names },
+                   { "-o", line->table, PW_WRITES, pw_cli_tables },
+                   { "--json", line->json, PW_WRITES, pw_cli_json } };
+  double width;
+  int status = pw_cli_requires ("--width", line->width, "--plots DIR", line->plots != NULL, error);
+  if (status == PW_OK) status = pw_figure_width (line->width, &width, error);
+  return status == PW_OK ? pw_files_open (line, use, sizeof use / sizeof *use, error) : status;
 }
 
-int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
-                            int (*csv) (const void *context, FILE *f, pw_error *error),
-                            void (*json) (const void *context, pw_json *j), pw_error *error) {
-  pw_output *file[2] = { NULL };
-  file[0] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.json", name), error);
-  if (file[0] && csv) file[1] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.csv", name), error);
-  int status = file[0] && (file[1] || csv == NULL) ? PW_OK : PW_RESOURCE;
-  if (status == PW_OK && csv) status = csv (context, pw_output_stream (file[1]), error);
-  if (status == PW_OK) {
-    json (context, &(pw_json){ .f = pw_output_stream (file[0]), .lines = lines });
-    return pw_output_finish_all (file, csv ? 2 : 1, error);
-  }
-  for (int i = 0; i < 2; i++)
-    if (file[i]) pw_output_discard (file[i]);
-  return status;
+int pw_results_write (pw_cli_line *line, int lines, const void *context,
+                      int (*csv) (const void *context, FILE *f, pw_error *error),
+                      void (*json) (const void *context, pw_json *j), pw_error *error) {
+  FILE *table = pw_files_stream (line, RESULTS_TABLE), *summary = pw_files_stream (line, RESULTS_JSON);
+  int status = PW_OK;
+  if (table) status = pw_cli_write_table (line->table, table, context, csv, error);
+  if (status == PW_OK && summary) json (context, &(pw_json){ .f = summary, .lines = lines });
+  return status == PW_OK ? pw_files_finish (line, error) : status;
 }
 
 /* ---- Scripts ---- */
@@ -322,6 +340,13 @@ void pw_curves_point (pw_curves *c, double x, double y, double z) {
     c->range[k][0] = fmin (c->range[k][0], low[k]);
     c->range[k][1] = fmax (c->range[k][1], high[k]);
   }
+}
+
+void pw_curves_cell (pw_curves *c, const double x[2], const double y[2], double z) {
+  if (isnan (z)) return;
+  pw_curves_point (c, (x[0] + x[1]) / 2, (y[0] + y[1]) / 2, z);
+  fseek (pw_output_stream (c->data), -1, SEEK_CUR); /* the end of the line */
+  fprintf (pw_output_stream (c->data), " %.10g %.10g %.10g %.10g\n", x[0], x[1], y[0], y[1]);
 }
 
 int pw_curves_close (pw_curves *c, int status, pw_error *error) {

@@ -34,13 +34,19 @@ int pw_figure_width (const char *text, double *width, pw_error *error);
 pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Locks the folder of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written.  Without a
- * folder (NULL) it only refuses --width.  A status. */
-int pw_figure_lock_folder (pw_cli_line *line, const char *folder, const char *name, pw_error *error);
-/* Writes NAME.json, with this value of pw_json.lines, and, unless csv is NULL, NAME.csv into the folder.  A status. */
-int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
-                            int (*csv) (const void *context, FILE *f, pw_error *error),
-                            void (*json) (const void *context, pw_json *j), pw_error *error);
+/* Options of commands whose results are a table, a summary and figures. */
+#define PW_RESULTS_OPTIONS(table_help, json_help, plots_help)                                                 \
+  PW_TEXT_OPTION (pw_cli_line, table, "output", 'o', "FILE.csv", table_help ", or as FILE.npz or FILE.json"), \
+      PW_TEXT_OPTION (pw_cli_line, json, "json", 0, "FILE", json_help " as JSON; - is standard output"),      \
+      PW_TEXT_OPTION (pw_cli_line, plots, "plots", 0, "DIR", plots_help " into a folder"), PW_WIDTH_OPTION
+
+/* Opens what they name.  -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood
+ * with a notice.  has_table: 0 if there will be no table.  A status. */
+int pw_results_open (pw_cli_line *line, const char *name, int has_table, pw_error *error);
+/* Writes table and summary, with this value of pw_json.lines.  A status. */
+int pw_results_write (pw_cli_line *line, int lines, const void *context,
+                      int (*csv) (const void *context, FILE *f, pw_error *error),
+                      void (*json) (const void *context, pw_json *j), pw_error *error);
 
 /* Opens the script NAME.gp; write the variables of its template to it, then end it.  NULL and PW_RESOURCE if it cannot
  * be written. */
@@ -108,6 +114,8 @@ void pw_curves_add (pw_curves *c, const char *style, const char *label);
 /* z: on the scale of colours, the number of a colour, or a standard deviation.  A point with a NaN, or without a
  * logarithm, interrupts the curve.  The line of an event has y = INFINITY; a band below y has x = INFINITY. */
 void pw_curves_point (pw_curves *c, double x, double y, double z);
+/* A cell of a map, of style `cells`: the ends in x and in y, and z on the scale of colours; none if z is NaN. */
+void pw_curves_cell (pw_curves *c, const double x[2], const double y[2], double z);
 /* Complete the files, if the status is PW_OK, else discard them; the second one draws the figure.  A status. */
 int pw_curves_close (pw_curves *c, int status, pw_error *error);
 int pw_curves_draw (pw_curves *c, int status, pw_error *error);

@@ -835,7 +835,8 @@ static const struct poptOption compare_options[] = {
       "Measure errors against this table, with columns as in run -o, instead of the model's exact solution or a "
       "computed reference"),
   PW_ALIAS_OPTION (pw_study, reference_path, "truth"),
-  PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and work-precision diagrams into a folder"),
+  PW_TEXT_OPTION (pw_study, table_path, "output", 'o', "FILE.csv", "Write the table of all runs"),
+  PW_TEXT_OPTION (pw_study, folder, "plots", 0, "DIR", "Write tables and work-precision diagrams into a folder"),
   PW_WIDTH_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,

@@ -224,7 +224,8 @@ static int table_write_row (pw_study *study, const pw_row *row, pw_error *error)
     else if (column[i].name)
       pw_text_number (&line, row->value[i]);
   pw_text_quoted (&line, row->reason);
-  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
+  return pw_text_line (&line, pw_output_stream (study->csv), study->table_path ? study->table_path : study->folder,
+                       error);
 }
 
 /* ---- Figures ---- */
@@ -267,19 +268,27 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", study->reference_path, PW_READS, NULL },
-                   { "-o", study->folder, PW_WRITES_INTO, names } };
-  if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
+                   { "-o", study->table_path, PW_WRITES, pw_cli_csv },
+                   { "--plots", study->folder, PW_WRITES_INTO, names } };
   double width;
-  int status = pw_figure_width (study->line.width, &width, error);
+  if (study->table_path && !pw_cli_names_file (study->table_path) && study->folder == NULL) {
+    pw_cli_say ("pinwheel: -o %s: an old spelling of --plots %s\n", study->table_path, study->table_path);
+    use[3].path = study->folder = study->table_path, use[2].path = study->table_path = NULL;
+  }
+  int status = pw_cli_requires ("--width", study->line.width, "--plots DIR", study->folder != NULL, error);
+  if (status == PW_OK) status = pw_figure_width (study->line.width, &width, error);
   if (status == PW_OK) status = pw_files_open (&study->line, use, sizeof use / sizeof *use, error);
-  if (status != PW_OK || (study->csv = pw_figure_open_file (study->folder, tables[0], error)) == NULL)
-    return error->status;
+  if (status != PW_OK || (study->folder == NULL && study->table_path == NULL)) return status;
+  study->csv = study->table_path ? study->line.files.output[2] : pw_figure_open_file (study->folder, tables[0], error);
+  study->line.files.output[2] = NULL;
+  if (study->csv == NULL) return error->status;
   pw_text heading = { .chars =
                           NULL }; /* rows follow as they finish, in NAME.part, which remains if the study is stopped */
   for (const pw_study_column *c = study->type->column; c < study->type->column + study->type->columns; c++)
     if (c->name) pw_text_name (&heading, c->name, c->unit);
   pw_text_cell (&heading, "reason");
-  return pw_text_line (&heading, pw_output_stream (study->csv), study->folder, error);
+  return pw_text_line (&heading, pw_output_stream (study->csv), study->table_path ? study->table_path : study->folder,
+                       error);
 }
 
 static int study_open (pw_study *study, pw_error *error) {
@@ -365,7 +374,7 @@ static int study_finish (pw_study *study, int status, pw_error *error) {
     return PW_INTERRUPTED;
   }
   if (*part_path) pw_cli_say ("pinwheel: the %s so far are kept in %s\n", study->type->row_noun, part_path);
-  if (study->csv && status == PW_OK) status = study->type->figures (study, error);
+  if (study->folder && status == PW_OK) status = study->type->figures (study, error);
   return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
 }
 

@@ -13,6 +13,7 @@
 #include <string.h>
 #include "motion.h"
 #include "pinwheel-analysis.h"
+#include "figure.h"
 #include "sweep.h"
 
 /* A compiled system, shared by rows with the same parameters. */
@@ -406,9 +407,9 @@ static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_
 typedef struct {
   /* as given */
   pw_cli_line line;
-  const char *path, *part_text, *jobs_text, *lanes_text; /* path: -o */
-  const char **ranges;                                   /* --vary */
-  int merge;                                             /* 1: --merge */
+  const char *part_text, *jobs_text, *lanes_text;
+  const char **ranges; /* --vary */
+  int merge;           /* 1: --merge */
   /* as understood */
   pw_plan plan;
   pw_journal journal;
@@ -420,11 +421,12 @@ static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
   if (sweep->line.arguments == 0)
     return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel sweep %s",
                     sweep->merge ? "--merge PART... -o FILE.csv" : pw_cli_sweep.synopsis);
-  if (sweep->path == NULL || *sweep->path == 0)
+  if (sweep->line.table == NULL || *sweep->line.table == 0)
     return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
-  if (strcmp (sweep->path, "-") == 0)
+  if (strcmp (sweep->line.table, "-") == 0)
     return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
-  if (pw_cli_check_csv (sweep->path, error) != PW_OK) return PW_INPUT;
+  if (sweep->line.plots && sweep->part_text)
+    return pw_fail (error, PW_INPUT, "--plots cannot be combined with --part: figures need all rows");
   if (!sweep->merge && sweep->ranges == NULL)
     return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=LOW:HIGH[:COUNT][:log] or NAME=V1,V2,...");
   return sweep->merge ? PW_OK : pw_cli_at_most_one (&pw_cli_sweep, &sweep->line, error);
@@ -470,7 +472,12 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
 }
 
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, pw_cli_csv } };
+  static const char *const figures[] = { "sweep.dat", "sweep.gp", "sweep.svg", "sweep.png", "sweep.pdf", NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "-o", sweep->line.table, PW_WRITES, sweep->part_text ? pw_cli_csv : pw_cli_tables },
+                   { "--json", sweep->line.json, PW_WRITES, pw_cli_json },
+                   { "--plots", sweep->line.plots, PW_WRITES_INTO, figures } };
+  double width;
   int status = pw_cli_file (&sweep->line, error);
   if (status == PW_OK) status = sweep_read_settings (sweep, error);
   if (status == PW_OK) status = pw_cli_check_uses (&sweep->line, use, sizeof use / sizeof *use, error);
@@ -478,7 +485,18 @@ static int sweep_open (pw_sweep *sweep, pw_error *error) {
   if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
                       sweep->plan.grid.rows);
-  if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->path, error);
+  if (status == PW_OK && sweep->line.plots && sweep->plan.grid.axes > 2)
+    status =
+        pw_fail (error, PW_INPUT, "--plots: figures show one or two varied quantities, not %d", sweep->plan.grid.axes);
+  if (status == PW_OK)
+    status = pw_cli_requires ("--width", sweep->line.width, "--plots DIR", sweep->line.plots != NULL, error);
+  if (status == PW_OK) status = pw_figure_width (sweep->line.width, &width, error);
+  use[1].path = NULL; /* the journal stands for it */
+  if (status == PW_OK) status = pw_files_open (&sweep->line, use, sizeof use / sizeof *use, error);
+  const size_t numbers = (size_t)sweep->plan.grid.rows * (size_t)pw_plan_drawn (&sweep->plan);
+  if (status == PW_OK && sweep->line.plots && (sweep->plan.drawn = malloc (numbers * sizeof (double))) == NULL)
+    status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->line.table, error);
   if (status != PW_OK) return status;
   if (sweep->journal.done > 0)
     pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
@@ -502,8 +520,90 @@ static int sweep_conclude (const pw_tally *tally, pw_error *error) {
   return PW_OK;
 }
 
+/* The ends of the cell of a value in a map: half way to its neighbours. */
+static void draw_ends (const pw_axis *axis, long i, double end[2]) {
+  const double value = pw_axis_value (axis, i);
+  const int logarithmic = axis->value == NULL && axis->range.logarithmic;
+  double side[2] = { -INFINITY, INFINITY };
+  for (long k = axis->value ? 0 : i > 0 ? i - 1 : 0; k < axis->count && (axis->value || k <= i + 1); k++) {
+    const double x = pw_axis_value (axis, k);
+    if (x < value) side[0] = fmax (side[0], x);
+    if (x > value) side[1] = fmin (side[1], x);
+  }
+  const double one = isfinite (side[0])   ? (logarithmic ? value / side[0] : value - side[0])
+                     : isfinite (side[1]) ? (logarithmic ? side[1] / value : side[1] - value)
+                                          : 1;
+  if (isinf (side[0])) side[0] = logarithmic ? value / one : value - one;
+  if (isinf (side[1])) side[1] = logarithmic ? value * one : value + one;
+  for (int k = 0; k < 2; k++) end[k] = logarithmic ? sqrt (value * side[k]) : (value + side[k]) / 2;
+}
+
+static int draw_by_value (const void *a, const void *b) {
+  const double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* Curves over one varied quantity, maps over two. */
+static int sweep_draw (pw_sweep *sweep, pw_error *error) {
+  const pw_plan *plan = &sweep->plan;
+  const pw_axis *axis = plan->grid.axis;
+  const int count = pw_plan_drawn (plan), maps = plan->grid.axes == 2;
+  const char *label[2] = { "", "" };
+  double range[2][2] = { { INFINITY, -INFINITY }, { INFINITY, -INFINITY } };
+  double (*point)[2] = malloc ((size_t)plan->grid.rows * sizeof *point);
+  pw_curves c;
+  if (point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_curves_open (&c, &sweep->line, sweep->line.plots, "sweep", "sweep", error), type = 0;
+  for (int k = 0; k <= maps; k++) {
+    label[k] = pw_arena_copy (&sweep->line.arena, PW_FIGURE_LABEL (axis[k].name, axis[k].unit ? axis[k].unit : ""));
+    if (label[k] == NULL && status == PW_OK) status = pw_fail (error, PW_RESOURCE, "out of memory");
+    if (axis[k].value == NULL && axis[k].range.logarithmic) type |= k ? PW_PANEL_LOG_Y : PW_PANEL_LOG_X;
+    for (long i = 0; i < axis[k].count; i++) {
+      double end[2] = { pw_axis_value (&axis[k], i), pw_axis_value (&axis[k], i) };
+      if (maps) draw_ends (&axis[k], i, end);
+      range[k][0] = fmin (range[k][0], end[0]), range[k][1] = fmax (range[k][1], end[1]);
+    }
+  }
+  for (int o = 0; o < count && status == PW_OK; o++) {
+    const struct pw_column *column = plan->outputs ? &plan->output[o] : &plan->column[o];
+    const char *name = PW_FIGURE_LABEL (column->name, column->unit ? column->unit : "");
+    pw_panel panel = {
+      .x_label = label[0], .y_label = maps ? label[1] : name, .z_label = maps ? name : NULL, .type = type
+    };
+    memcpy (panel.x, range[0], sizeof panel.x);
+    if (maps) memcpy (panel.y, range[1], sizeof panel.y), panel.type |= PW_PANEL_HALF;
+    if (!maps) panel.type |= PW_PANEL_BELOW;
+    pw_curves_panel (&c, &panel);
+    pw_curves_add (&c, maps ? "cells" : "line", NULL);
+    for (long row = 0; row < plan->grid.rows; row++) {
+      const double z = plan->drawn[row * count + o];
+      double end[2][2];
+      for (int k = 0; k <= maps; k++) draw_ends (&axis[k], row / axis[k].stride % axis[k].count, end[k]);
+      if (maps) pw_curves_cell (&c, end[0], end[1], z);
+      point[row][0] = pw_grid_value (&plan->grid, 0, row), point[row][1] = z;
+    }
+    if (!maps) qsort (point, (size_t)plan->grid.rows, sizeof *point, draw_by_value);
+    for (long row = 0; row < plan->grid.rows && !maps; row++) pw_curves_point (&c, point[row][0], point[row][1], 0);
+  }
+  free (point);
+  return pw_curves_draw (&c, status, error);
+}
+
+static void sweep_json (const pw_sweep *sweep, const pw_tally *tally, FILE *f) {
+  pw_json j = { .f = f, .lines = 1 };
+  pw_json_print (
+      &j, "{schema: %d, model: %s, method: %s, status: %s, runs: %ld, failed: %ld, reason: %s, table: %s, vary: [", 1,
+      pw_file_name (sweep->line.m.file), sweep->plan.method,
+      tally->failed == tally->rows ? pw_cli_status_word (-tally->status) : "ok", tally->rows, tally->failed,
+      tally->failed ? tally->reason : "", sweep->line.table);
+  for (const pw_axis *axis = sweep->plan.grid.axis; axis < sweep->plan.grid.axis + sweep->plan.grid.axes; axis++)
+    pw_json_print (&j, "{name: %s, values: %s}", axis->name, axis->text);
+  pw_json_print (&j, "]}");
+}
+
 static int sweep_finish (pw_sweep *sweep, pw_error *error) {
   pw_tally tally;
+  pw_error drawing = { 0 };
   if (sweep->journal.done == 0) {
     fputs ("pinwheel: interrupted before the first run was done\n", stderr);
     return PW_INTERRUPTED;
@@ -514,6 +614,10 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
     return PW_INTERRUPTED;
   }
   int status = pw_sweep_finish (&sweep->journal, &sweep->plan, &tally, error);
+  if (status != PW_OK) return status;
+  const int drawn = sweep->line.plots ? sweep_draw (sweep, &drawing) : PW_OK;
+  if (pw_files_stream (&sweep->line, 2)) sweep_json (sweep, &tally, pw_files_stream (&sweep->line, 2));
+  status = pw_figure_status (drawn, &drawing, pw_files_finish (&sweep->line, error), error);
   if (status != PW_OK) return status;
   if (sweep->plan.parts == 1) return sweep_conclude (&tally, error);
   sweep_report_failures (&tally); /* whether all have failed is known after the merge */
@@ -529,7 +633,7 @@ static int sweep_command (void *options, pw_error *error) {
   if (other)
     status = pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", other);
   if (status == PW_OK && sweep->merge) {
-    status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->path, &tally, error);
+    status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->line.table, &tally, error);
     return status == PW_OK ? sweep_conclude (&tally, error) : status;
   }
   if (status == PW_OK) status = sweep_open (sweep, error);
@@ -546,7 +650,8 @@ static const struct poptOption sweep_options[] = {
                   "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
                   "RANGE: LOW:HIGH[:COUNT][:log], 11 values if no COUNT is given, or a list V1,V2,..."),
   PW_LIST_OPTION (pw_sweep, plan.of, "of", 0, "OUTPUT", "Add a column: " PW_OUTPUT_HELP "; repeatable"),
-  PW_TEXT_OPTION (pw_sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
+  PW_RESULTS_OPTIONS ("Write the table", "Write a summary",
+                      "Draw the outputs, or the states, as curves over one varied quantity or as maps over two,"),
   PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",
                   "Runs that a thread advances at once, " SWEEP_LANES ", with steps of fixed size and specialised code "

@@ -58,6 +58,7 @@ typedef struct {
   int with_error;  /* 1: columns with the stated errors of states */
   const char **of; /* --of: outputs, ended by NULL; NULL: none */
   int outputs;     /* their number */
+  double *drawn;   /* rows x outputs, or states if there are none: set by pw_sweep_finish; NULL: not wanted */
   int part, parts; /* --part; 1, 1 if it is not given */
   pw_specialise specialise;
   int lanes; /* --lanes, runs that a thread advances at once by vector instructions; 0: not given */
@@ -67,7 +68,8 @@ typedef struct {
   pw_scene_code *lanes_code; /* the same for several runs at once; NULL: none */
   struct pw_column {
     const char *name, *unit;
-  } * column; /* of the states of all bodies and elements */
+    int is_known; /* of an output: 1 if the table has this column anyway */
+  } * column;     /* of the states of all bodies and elements */
   int columns;
   struct pw_column *output; /* outputs: of each */
   int by_steps;             /* 1: outputs or the condition of --until need each step */
@@ -78,6 +80,10 @@ typedef struct {
   pw_text heading;          /* the table's first line, without its end */
   pw_text fingerprint;      /* the first lines of a journal or part: everything that determines the rows */
 } pw_plan;
+
+/* The number of columns that are drawn: outputs; without any, the first states. */
+enum { PW_PLAN_DRAWN = 12 };
+int pw_plan_drawn (const pw_plan *plan);
 
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->line, and finds
  * the columns by compiling models of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in every case. */

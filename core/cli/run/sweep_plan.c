@@ -174,7 +174,7 @@ static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *e
         pw_names_add (&plan->column_of, plan->column[k].name, k);
     }
     if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
-    plan->column[plan->columns] = (struct pw_column){ copy, unit };
+    plan->column[plan->columns] = (struct pw_column){ copy, unit, 1 };
     pw_names_add (&plan->column_of, copy, plan->columns++);
   }
   for (pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++)
@@ -207,9 +207,8 @@ static int plan_open_outputs (pw_plan *plan, const pw_system *system, long row, 
                               PW_DIGITS (pw_grid_value (&plan->grid, (int)i, row), 6));
   if (status != PW_OK) pw_fail (error, status, "%.400s (in the run with %s)", own.text, run);
   for (int i = 0; i < plan->outputs && status == PW_OK; i++) {
-    if (pw_names_find (&plan->column_of, plan->of[i]) >= 0 || strcmp (plan->of[i], "t") == 0 ||
-        strcmp (plan->of[i], "kinetic") == 0)
-      status = pw_fail (error, PW_INPUT, "--of %s: the table has this column; leave it out", plan->of[i]);
+    plan->output[i].is_known = pw_names_find (&plan->column_of, plan->of[i]) >= 0 || strcmp (plan->of[i], "t") == 0 ||
+                               strcmp (plan->of[i], "kinetic") == 0;
     plan->output[i].name = plan->of[i];
     plan->output[i].unit = pw_arena_copy (&plan->arena, pw_outcome_unit (&set, i, unit, sizeof unit));
     if (plan->output[i].unit == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
@@ -301,8 +300,9 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
     plan_cell (row, text, name, plan->column[i].unit, known ? row->error[row->state[i]] : NAN);
   }
   for (int i = 0; i < plan->outputs; i++)
-    plan_cell (row, text, plan->output[i].name, plan->output[i].unit,
-               row && row->of ? pw_outcome_value (row->of, i) : NAN);
+    if (!plan->output[i].is_known)
+      plan_cell (row, text, plan->output[i].name, plan->output[i].unit,
+                 row && row->of ? pw_outcome_value (row->of, i) : NAN);
   plan_cell (row, text, "kinetic", "J", last ? last->kinetic : NAN);
   plan_cell (row, text, "residual.position", NULL, run ? statistics->position : NAN);
   plan_cell (row, text, "residual.velocity", NULL, run ? statistics->velocity : NAN);
@@ -367,6 +367,7 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
 }
 
 void pw_plan_close (pw_plan *plan) {
+  free (plan->drawn);
   pw_cli_engine_close (&plan->engine);
   pw_scene_code_close (plan->lanes_code);
   pw_names_close (&plan->column_of);
@@ -580,6 +581,57 @@ static int table_close (pw_output *output, pw_error *error) {
   return error->status;
 }
 
+int pw_plan_drawn (const pw_plan *plan) {
+  return plan->outputs ? plan->outputs : plan->columns < PW_PLAN_DRAWN ? plan->columns : PW_PLAN_DRAWN;
+}
+
+/* The cell of a row, see pw_plan_cells, that contains what is drawn as number i. */
+static int table_cell_of (const pw_plan *plan, int i) {
+  const int states = plan->grid.axes + 2;
+  int cell = states + plan->columns * (1 + plan->with_error);
+  if (plan->outputs == 0) return states + i;
+  for (int k = 0; k < (plan->output[i].is_known ? plan->outputs : i); k++) cell += !plan->output[k].is_known;
+  if (!plan->output[i].is_known || strcmp (plan->output[i].name, "kinetic") == 0) return cell;
+  const int state = pw_names_find (&plan->column_of, plan->output[i].name);
+  return state < 0 ? states - 1 /* t */ : states + state;
+}
+
+/* Stores the numbers of a row that are drawn. */
+static void table_keep (const pw_plan *plan, long row, const char *line) {
+  const int count = pw_plan_drawn (plan);
+  for (int i = 0; i < count; i++) {
+    const char *cell = line;
+    for (int k = table_cell_of (plan, i); k > 0; k--) cell += strcspn (cell, ",") + 1;
+    double *value = &plan->drawn[row * count + i];
+    if (pw_read_number (PW_PRINTED (60, "%.*s", (int)strcspn (cell, ","), cell), value) != PW_OK) *value = NAN;
+  }
+}
+
+/* What table_write needs. */
+typedef struct {
+  const pw_journal *journal;
+  const pw_plan *plan;
+  const journal_map *map;
+  pw_tally *tally;
+} table_source;
+
+/* Writes the table, or the part, of a complete journal. */
+static int table_write (const void *context, FILE *f, pw_error *error) {
+  const table_source *x = context;
+  const pw_plan *plan = x->plan;
+  const int is_part = plan->parts > 1;
+  fprintf (f, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.chars : plan->heading.chars);
+  for (long k = 0; k < x->journal->rows; k++) {
+    const char *at = x->map->begin + x->journal->offset[k];
+    journal_line line;
+    if (!table_read_row (at, x->map->end, plan->part - 1 + k * plan->parts, &line, x->tally))
+      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", x->journal->path);
+    fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, f);
+    if (plan->drawn) table_keep (plan, k, line.text);
+  }
+  return PW_OK;
+}
+
 int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
   journal_map map;
   pw_error failure = { 0 };
@@ -587,17 +639,8 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
-  FILE *stream = output ? pw_output_stream (output) : NULL;
-  const int is_part = plan->parts > 1;
-  if (output) fprintf (stream, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.chars : plan->heading.chars);
-  for (long k = 0; k < journal->rows && failure.status == PW_OK; k++) {
-    const char *at = map.begin + journal->offset[k];
-    journal_line line;
-    if (!table_read_row (at, map.end, plan->part - 1 + k * plan->parts, &line, tally))
-      pw_fail (&failure, PW_RESOURCE, "%s was changed by another program", journal->path);
-    else
-      fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
-  }
+  const table_source source = { journal, plan, &map, tally };
+  if (output) pw_cli_write_table (journal->table_path, pw_output_stream (output), &source, table_write, &failure);
   if (output) table_close (output, &failure);
   journal_map_close (&map);
   if (failure.status != PW_OK)

@@ -5,7 +5,7 @@
 # colours; '': none), form_k (words: half, beside another one if there is room; below, with the x axis of the panel
 # above it; logx, logy), aspect_k (height / width; 0: low and wide), range_k (x0 x1 y0 y1 z0 z1), curves_k (numbers of
 # the first and the last one).  Of curve c: style_c, label_c ('': not in the legend), block_c (of the data; -1: it has
-# no points), points_c (their number).  Columns of the data: x, y, z.
+# no points), points_c (their number).  Columns of the data: x, y, z; of cells the ends in x and y after them.
 
 data = name.'.dat'
 get(what, k) = value(sprintf('%s_%d', what, k))
@@ -25,6 +25,7 @@ look(s, i) = \
   s eq 'change' ? 'vectors nohead '.line(0.7, '(2,4)', '000000') : \
   s eq 'fold' ? 'vectors nohead '.line(0.7, '(10,4,2,4)', 'c49a00') : \
   s eq 'event' ? sprintf("vectors nohead lw 0.5 dt %s lc rgb '%s'", word(dashes, i % 4 + 1), colour(9 - i%8)) : \
+  s eq 'cells' ? 'boxxyerror lc palette fs solid border' : \
   s eq 'graded' ? 'lines lw 0.7 dt 1 lc palette' : \
   s eq 'band' ? "boxxyerror fc rgb '#e8e8e8' fs solid noborder" : \
   s eq 'bars' ? "yerrorbars pt 7 ps 0.35 lw 0.6 lc rgb '#888888'" : \
@@ -46,6 +47,7 @@ across(s) = s eq 'change' || s eq 'fold' || s eq 'event'
 shown_limit(k, i) = limit(k, i)/10.0**tens[k]
 part(s, k) = across(s) ? sprintf('1:(%g):(0):(%g)', shown_limit(k, 3), shown_limit(k, 4) - shown_limit(k, 3)) : \
   s eq 'band' ? sprintf('(%g):2:(%g):(%g):(%g):2', limit(k, 1), limit(k, 1), limit(k, 2), limit(k, 3)) : \
+  s eq 'cells' ? '1:'.shown_column(k, 2).':4:5:'.shown_column(k, 6).':'.shown_column(k, 7).':3' : \
   s eq 'bars' ? '1:'.shown_column(k, 2).':'.shown_column(k, 3) : \
   '1:'.shown_column(k, 2).(s eq 'numbered' || s eq 'scale' || s eq 'graded' ? ':3' : '')
 # A label of a method without its stabilisation.
