@@ -95,7 +95,7 @@ original () {
 }
 
 drift () {
-  "$program" drift pendulum --t-end 100 --step 0.01 -o "$work/drift"
+  "$program" drift pendulum --t-end 100 --step 0.01 --plots "$work/drift"
 }
 
 peers () {

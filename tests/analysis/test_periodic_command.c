@@ -24,7 +24,7 @@ static const char oscillator[] =
 
 TEST (motion) {
   cli_write ("oscillator.yaml", oscillator);
-  cli_good ("pinwheel periodic @/oscillator.yaml -o @/one");
+  cli_good ("pinwheel periodic @/oscillator.yaml -o @/one/periodic.csv --json @/one/periodic.json --plots @/one");
   cli_shows ("oscillator: a periodic motion\n");
   cli_shows ("  period                       7.85398163 s, of the signals\n");
   cli_shows ("  Floquet multipliers          0.265099 +- 0.621016 i, modulus 0.675232\n");
@@ -47,9 +47,10 @@ TEST (without_multipliers) {
                               "  - {wheel: front, body: car, at: [0.5, 0], heading: steer}\n"
                               "  - {speed: engine, body: car, at: [-0.4, 0], "
                               "value: {harmonic: {amplitude: 0.3, omega: 4, offset: 1}}}\n");
-  cli_good ("pinwheel periodic @/tricycle.yaml -o @/path");
+  cli_good ("pinwheel periodic @/tricycle.yaml -o @/path/periodic.csv --json @/path/periodic.json --plots @/path");
   assert_string_equal (cli_err, "");
-  cli_good ("pinwheel periodic @/tricycle.yaml --vary steer=0.1:0.3 -o @/path");
+  cli_good ("pinwheel periodic @/tricycle.yaml --vary steer=0.1:0.3 -o @/path/periodic.csv --json @/path/periodic.json "
+            "--plots @/path");
   assert_string_equal (cli_err, "");
   assert_non_null (cli_file ("path/periodic.svg"));
   cli_write ("fixed.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
@@ -61,13 +62,15 @@ TEST (without_multipliers) {
 
 /* Twice the period: the multipliers are squared. */
 TEST (periods) {
-  cli_good ("pinwheel periodic @/oscillator.yaml --periods 2 -o @/two");
+  cli_good (
+      "pinwheel periodic @/oscillator.yaml --periods 2 -o @/two/periodic.csv --json @/two/periodic.json --plots @/two");
   const char *json = cli_file ("two/periodic.json");
   check_close ("re", cli_number (json, "motions", "multipliers", "re", NULL),
                0.265099104796 * 0.265099104796 - 0.621015774681 * 0.621015774681, 4e-8,
                "steps of the derivatives: 1e-9 each");
   /* also where the branch begins, at a value without a signal that changes */
-  cli_good ("pinwheel periodic @/oscillator.yaml --periods 2 --vary A=0:0.2 -o @/two");
+  cli_good ("pinwheel periodic @/oscillator.yaml --periods 2 --vary A=0:0.2 -o @/two/periodic.csv --json "
+            "@/two/periodic.json --plots @/two");
   double period;
   assert_int_equal (sscanf (strchr (cli_file ("two/periodic.csv"), '\n'), "\n0,point,%lf", &period), 1);
   check_close ("period", period, 5 * PW_PI, 16 * CHECK_EPS * period, "twice 2 pi / 0.8");
@@ -111,7 +114,8 @@ TEST (free_rotation) {
              "  - {pin: axle, body: [flywheel, bob], at: [[0, 0], [0, -1]]}\n"
              "  - {gravity: gravity, acceleration: [0, -1]}\n"
              "  - {torque: drive, body: [bob, ground], value: {harmonic: {amplitude: 0.1, omega: 4}}}\n");
-  cli_good ("pinwheel periodic @/flywheel.yaml -o @/flywheel");
+  cli_good ("pinwheel periodic @/flywheel.yaml -o @/flywheel/periodic.csv --json @/flywheel/periodic.json --plots "
+            "@/flywheel");
   cli_shows ("  relative to the whole        flywheel: a free rotation by 3.14159 rad\n");
   const char *json = cli_file ("flywheel/periodic.json");
   check_close ("rotation", cli_number (json, "motions", "rotations", "flywheel", NULL), PW_PI, 1e-9,
@@ -138,7 +142,8 @@ TEST (turns) {
                              "  - {friction: air, body: [bob, ground], viscous: 0.1}\n"
                              "  - {torque: drive, body: [bob, ground], value: 0.5}\n"
                              "  - {rotational-spring: spring, body: [ground, bob], stiffness: k}\n");
-  cli_good ("pinwheel periodic @/running.yaml --period free -o @/running");
+  cli_good ("pinwheel periodic @/running.yaml --period free -o @/running/periodic.csv --json @/running/periodic.json "
+            "--plots @/running");
   const char *json = cli_file ("running/periodic.json");
   double T = cli_number (json, "motions", "period", NULL);
   check_close ("multiplier", cli_number (json, "motions", "multipliers", "re", NULL), exp (-0.1 * T), 2e-8,
@@ -161,7 +166,8 @@ TEST (turning_gait) {
 /* The branch through both folds, and one row of the table for each point. */
 TEST (branch) {
   int rows = 0, folds = 0;
-  cli_good ("pinwheel periodic @/oscillator.yaml --vary A=0.1:0.35 -o @/branch");
+  cli_good ("pinwheel periodic @/oscillator.yaml --vary A=0.1:0.35 -o @/branch/periodic.csv --json "
+            "@/branch/periodic.json --plots @/branch");
   cli_shows ("  fold              0.255190316 ");
   cli_shows ("  fold              0.146046589 ");
   const char *csv = cli_file ("branch/periodic.csv");
@@ -241,7 +247,8 @@ TEST (two_events) {
                          "  - {torque: ta, body: [a, ground], value: -2*a.phi + (p - 0.31)*a.omega}\n"
                          "  - {torque: tb, body: [b, ground], value: -5*b.phi + (p - 0.33)*b.omega}\n"
                          "  - {torque: drive, body: [a, ground], value: {harmonic: {amplitude: 0.1, omega: 1}}}\n");
-  cli_good ("pinwheel periodic @/two.yaml --vary p=0.1:2 -o @/two");
+  cli_good (
+      "pinwheel periodic @/two.yaml --vary p=0.1:2 -o @/two/periodic.csv --json @/two/periodic.json --plots @/two");
   for (const char *line = cli_file ("two/periodic.csv"); *line; line = strchr (line, '\n') + 1) {
     char *end;
     double p = strtod (line, &end);
@@ -306,7 +313,9 @@ TEST (symmetries_of_range) {
 }
 
 TEST (limit) {
-  cli_bad ("pinwheel periodic snakeboard --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
+  cli_bad (
+      "pinwheel periodic snakeboard --limit 1e-9 -o @/limit/periodic.csv --json @/limit/periodic.json --plots @/limit",
+      4, "--limit 1e-9: stopped; results are incomplete");
   /* in the search, and on the branch: by far less than the 0.6 s and 1.3 s that these take without a limit */
   cli_bad ("pinwheel periodic snakeboard --limit 0.01", 4, "--limit 0.01: stopped; results are incomplete");
   cli_bad ("pinwheel periodic @/oscillator.yaml --vary w=0.5:1 --limit 0.03", 4,
@@ -352,7 +361,8 @@ TEST (bad) {
 
 /* Without losses the snakeboard is faster after each period; a pendulum at rest stays there. */
 TEST (none) {
-  assert_int_equal (cli_run ("pinwheel periodic snakeboard -o @/none"), 4);
+  assert_int_equal (
+      cli_run ("pinwheel periodic snakeboard -o @/none/periodic.csv --json @/none/periodic.json --plots @/none"), 4);
   assert_non_null (strstr (cli_err,
                            "snakeboard: no periodic motion with period 2 s found: Newton's method, begun after this "
                            "many periods of a run, ends at this residual (in units of the scene, L and L/T): 0 ("));

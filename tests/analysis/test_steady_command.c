@@ -8,7 +8,7 @@
 
 /* A turn of the n-trailer, and what to hold to select it. */
 TEST (motion) {
-  cli_good ("pinwheel steady n-trailer --starts 0 -o @/turn");
+  cli_good ("pinwheel steady n-trailer --starts 0 -o @/turn/steady.csv --json @/turn/steady.json --plots @/turn");
   cli_shows ("n-trailer: 1 steady motion up to 3 symmetries, from the initial state and 0 random ones\n");
   cli_shows (
       "Motion 1 is one of a family of dimension 2; to select one: --hold tractor.speed=2 --hold tractor.omega=1\n");
@@ -55,7 +55,9 @@ TEST (singular_constraints) {
   for (int i = 0; i < 6; i++) {
     int ends = 0;
     cli_write ("singular.yaml", model[i / 3]);
-    assert_int_equal (cli_run (check_text ("pinwheel steady @/singular.yaml --vary d=%s -o @/singular", range[i % 3])),
+    assert_int_equal (cli_run (check_text ("pinwheel steady @/singular.yaml --vary d=%s -o @/singular/steady.csv "
+                                           "--json @/singular/steady.json --plots @/singular",
+                                           range[i % 3])),
                       0);
     assert_null (strstr (cli_out, "zero eigenvalue"));
     for (const char *line = strstr (cli_out, "Branch "); line; line = strstr (line + 1, "Branch ")) {
@@ -80,7 +82,8 @@ static double table_number (const char *line, int column) {
 /* The car of the manual: the row of the event, and one row for each point. */
 TEST (branch) {
   int rows = 0, events = 0;
-  cli_good ("pinwheel steady car-tyres --set steer=0 --set a=1.4 --set b=1.2 --vary u=20:60 --starts 2 -o @/car");
+  cli_good ("pinwheel steady car-tyres --set steer=0 --set a=1.4 --set b=1.2 --vary u=20:60 --starts 2 -o "
+            "@/car/steady.csv --json @/car/steady.json --plots @/car");
   cli_shows ("car-tyres: 1 branch of steady motions up to 3 symmetries, u from 20 to 60\n");
   cli_shows ("       1  zero eigenvalue    51.9999995        0                0                \n");
   const char *csv = cli_file ("car/steady.csv");
@@ -101,7 +104,9 @@ TEST (branch) {
 
 /* What is held is varied; the rest is held as in the initial motion, which is reported. */
 TEST (vary_held) {
-  assert_int_equal (cli_run ("pinwheel steady n-trailer --vary tractor.curvature=0.1:0.5 --starts 0 -o @/held"), 0);
+  assert_int_equal (cli_run ("pinwheel steady n-trailer --vary tractor.curvature=0.1:0.5 --starts 0 -o "
+                             "@/held/steady.csv --json @/held/steady.json --plots @/held"),
+                    0);
   assert_string_equal (cli_err, "pinwheel: holding tractor.speed=2, as in the motion nearest to the initial state\n");
   const char *json = cli_file ("held/steady.json");
   check_close ("speed", cli_number (json, "held", "tractor.speed", NULL), 2, 1e-12, "that of the initial state");
@@ -118,7 +123,9 @@ TEST (curved_pitchfork) {
                           "  - {rotational-spring: s, body: [b, ground], stiffness: 3, damping: 0.2}\n");
   for (size_t k = 0; k < sizeof last / sizeof *last; k++) {
     int events = 0;
-    cli_good (check_text ("pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork", last[k]));
+    cli_good (check_text (
+        "pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork/steady.csv --json @/fork/steady.json --plots @/fork",
+        last[k]));
     for (const char *line = strchr (cli_file ("fork/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
       double p = table_number (line, 2);
       check_close ("residual", table_number (line, 4), 0, 1e-9, "Newton's tolerance, or the cubic near the pitchfork");
@@ -138,7 +145,8 @@ TEST (closed_branch) {
                             "bodies: [{name: b, mass: 1, inertia: 1, start: {x: -0.8}}]\nelements:\n"
                             "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {force: f, body: b, at: [0, 0], fx: {expression: \"b.x^2 + p^2 - 1 - 0.5*b.vx\"}}\n");
-  cli_good ("pinwheel steady @/circle.yaml --vary p=-2:2 --starts 0 -o @/circle");
+  cli_good ("pinwheel steady @/circle.yaml --vary p=-2:2 --starts 0 -o @/circle/steady.csv --json @/circle/steady.json "
+            "--plots @/circle");
   cli_shows ("circle: 1 branch of steady motions, p from -2 to 2\n");
   for (const char *line = strchr (cli_file ("circle/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
     double p = table_number (line, 2), x = table_number (line, 5);
@@ -175,7 +183,8 @@ TEST (turned_branch) {
                             "  - {speed: engine, body: tractor, at: [0, 0], value: 1}\n"
                             "  - {pin: hitch, body: [tractor, trailer], at: [[0, 0], [1, 0]]}\n"
                             "  - {wheel: axle, body: trailer, at: [0, 0]}\n");
-  cli_good ("pinwheel steady @/turned.yaml --vary steer=-0.7:0.8 -o @/turns");
+  cli_good ("pinwheel steady @/turned.yaml --vary steer=-0.7:0.8 -o @/turns/steady.csv --json @/turns/steady.json "
+            "--plots @/turns");
   cli_shows ("turned: 1 branch of ");
   cli_shows ("       1  fold              0.463647609        0 ");
   cli_shows ("       1  fold             -0.463647609        0 ");
@@ -186,7 +195,8 @@ TEST (turned_branch) {
                          "  - {gravity: g, acceleration: [0, -1]}\n"
                          "  - {torque: M, body: [arm, ground], value: T}\n"
                          "  - {rotational-spring: s, body: [arm, ground], stiffness: k, damping: 0.2}\n");
-  cli_good ("pinwheel steady @/arm.yaml --vary T=-2:2 -o @/turns");
+  cli_good (
+      "pinwheel steady @/arm.yaml --vary T=-2:2 -o @/turns/steady.csv --json @/turns/steady.json --plots @/turns");
   cli_shows ("arm: 1 branch of ");
   cli_shows ("       1  fold                        1        0 ");
   assert_int_equal (steady_lines ("1,fold,"), 2);
@@ -215,7 +225,8 @@ TEST (standstill) {
              "  - {speed: e, body: s, at: [-0.3, 0], value: u}\n  - {wheel: w, body: s, at: [-0.3, 0]}\n");
   for (size_t k = 0; k < sizeof each / sizeof *each; k++) {
     int events = 0;
-    cli_good (check_text ("pinwheel steady @/%s --starts 0 -o @/still", each[k]));
+    cli_good (check_text (
+        "pinwheel steady @/%s --starts 0 -o @/still/steady.csv --json @/still/steady.json --plots @/still", each[k]));
     for (const char *line = strchr (cli_file ("still/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
       if (strncmp (line, "1,point,", 8) == 0) continue;
       assert_int_equal (strncmp (line, "1,zero eigenvalue,", 18), 0);
@@ -236,7 +247,8 @@ TEST (without_modes) {
                               "  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
                               "  - {wheel: front, body: car, at: [0.5, 0], heading: steer}\n"
                               "  - {speed: engine, body: car, at: [-0.4, 0], value: 1}\n");
-  cli_good ("pinwheel steady @/tricycle.yaml --vary steer=-0.5:0.5 -o @/tricycle");
+  cli_good ("pinwheel steady @/tricycle.yaml --vary steer=-0.5:0.5 -o @/tricycle/steady.csv --json "
+            "@/tricycle/steady.json --plots @/tricycle");
   assert_string_equal (cli_err, "");
   const char *svg = cli_file ("tricycle/steady.svg");
   assert_true (svg && strstr (svg, "unstable") && !strstr (svg, "stability changes") && !strstr (svg, "fold"));
@@ -261,12 +273,14 @@ TEST (ramp) {
 /* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found
  * at. */
 TEST (ends) {
-  cli_good ("pinwheel steady pendulum --vary l=0.7:1.3 --starts 0 -o @/ends");
+  cli_good ("pinwheel steady pendulum --vary l=0.7:1.3 --starts 0 -o @/ends/steady.csv --json @/ends/steady.json "
+            "--plots @/ends");
   const char *line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
   assert_true (table_number (line, 2) == 0.7);
   for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
   assert_true (table_number (line, 2) == 1.3);
-  cli_good ("pinwheel steady @/circle.yaml --vary p=0.5:2 --starts 0 -o @/ends");
+  cli_good ("pinwheel steady @/circle.yaml --vary p=0.5:2 --starts 0 -o @/ends/steady.csv --json @/ends/steady.json "
+            "--plots @/ends");
   line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
   for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
   assert_true (table_number (line, 2) == 0.5);
@@ -274,7 +288,8 @@ TEST (ends) {
                             "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
                             "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
                             "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: c_d}\n");
-  cli_good ("pinwheel steady @/damped.yaml --vary c_d=1:0 --starts 0 -o @/ends");
+  cli_good ("pinwheel steady @/damped.yaml --vary c_d=1:0 --starts 0 -o @/ends/steady.csv --json @/ends/steady.json "
+            "--plots @/ends");
   cli_shows ("damped: 1 branch of steady motions");
   assert_non_null (strstr (cli_file ("ends/steady.svg"), ">c_d<")); /* plain text, without a subscript */
   line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
@@ -289,7 +304,7 @@ TEST (rest) {
   cli_write ("rest.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                           "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
                           "  - {drag: air, body: b, quadratic: 1}\n");
-  cli_good ("pinwheel steady @/rest.yaml --starts 5 -o @/rest");
+  cli_good ("pinwheel steady @/rest.yaml --starts 5 -o @/rest/steady.csv --json @/rest/steady.json --plots @/rest");
   cli_shows ("rest: 1 steady motion up to 1 symmetry, ");
   check_close ("speed", cli_number (cli_file ("rest/steady.json"), "motions", "state", "b.vx", NULL), 0, 0, "exact");
   /* there residuals grow with the third power of velocities, so that Newton's method ends before it reaches rest */
@@ -328,7 +343,8 @@ TEST (linearise_later) {
 }
 
 TEST (limit) {
-  cli_bad ("pinwheel steady n-trailer --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
+  cli_bad ("pinwheel steady n-trailer --limit 1e-9 -o @/limit/steady.csv --json @/limit/steady.json --plots @/limit", 4,
+           "--limit 1e-9: stopped; results are incomplete");
 }
 
 /* An oscillator on a car that turns at 1 rad/s: the frequency of a Hopf event is its own, not that of the frame. */
@@ -357,7 +373,8 @@ TEST (without_unit) {
                            "}\n"
                            "PW_MODEL (.about = \"a wheel\", .parameters = list, .parameters_size = sizeof (numbers),\n"
                            "          .build = build);\n");
-  cli_shell ("pinwheel steady @/unitless.c --vary v=1:2 --starts 0 -o @/unitless");
+  cli_shell ("pinwheel steady @/unitless.c --vary v=1:2 --starts 0 -o @/unitless/steady.csv --json "
+             "@/unitless/steady.json --plots @/unitless");
   assert_int_equal (strncmp (cli_file ("unitless/steady.csv"), "branch,event,v,growing,", 23), 0);
   cli_good ("pinwheel sensitivity @/unitless.c --of a.x --by v -t 1");
   cli_shows ("  v                          1             1  m ");

@@ -100,7 +100,9 @@ TEST (more_symmetries) {
   cli_shell ("pinwheel steady @/held.yaml --hold bob.speed=0 --hold bob.omega=0 --vary k=0:1 --starts 5");
   cli_shows ("held: 1 branch of steady motions up to 2 symmetries, k from 0 to 1\n");
   cli_shows ("       1  begins                      1        0                0        0.159155\n");
-  assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=1:0.5 -o @/circle"), 0);
+  assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=1:0.5 -o @/circle/steady.csv "
+                             "--json @/circle/steady.json --plots @/circle"),
+                    0);
   const char *json = cli_file ("circle/steady.json");
   double number[4];
   for (int i = 0; i < 4; i++)

@@ -50,12 +50,27 @@ TEST (bad_lines) {
     { "run ezyroller --width 85mm", "--width 85mm: only with --plots DIR" },
     { "run ezyroller --colour time", "--colour time: only with --plots DIR" },
     { "optimise ezyroller --maximise frame.x --free a --width 85mm", "--width 85mm: only with --plots DIR" },
-    { "compare ezyroller --width 85mm", "--width 85mm: only with -o DIR" },
-    { "steady pendulum --width 85mm", "--width 85mm: only with -o DIR" },
-    { "sensitivity pendulum --of bob.x --by l --every 1", "--every 1: only with -o DIR" },
+    { "compare ezyroller --width 85mm", "--width 85mm: only with --plots DIR" },
+    { "steady pendulum --width 85mm", "--width 85mm: only with --plots DIR" },
+    { "sensitivity pendulum --of bob.x --by l --every 1", "--every 1: only with -o FILE" },
     { "run ezyroller --set aa=1", "model ezyroller has no parameter \"aa\"; did you mean \"a\"?" },
     { "run ezyroller --set frame.vx=1",
       "--set frame.vx=1: expected a parameter; initial values of states are given by --start" },
+    { "run pure-pursuit --set steer=0.1",
+      "--set steer=0.1: expected a parameter; initial values of states are given by --start" },
+    { "run tests/models/arms.yaml --set a_A=1", "--set a_A=1: A is a parameter of an included file; the model sets "
+                                                 "it by \"set: {A: NAME}\" in the entry of that "
+                                                 "file, from a parameter NAME of its own" },
+    { "run ezyroller --until 'frame.x > 2 m'",
+      "--until frame.x > 2 m: \"m\" after a number: write it without a unit, in SI units, angles in rad or as 90*deg" },
+    { "sweep n-trailer --vary n=1,2 --of trailer2.x -t 1 -o @/n.csv",
+      "--of trailer2.x: no column \"trailer2.x\"; did you mean \"trailer1.x\"? (in the run with n = 1)" },
+    { "run ezyroller --of frame.q", "--of frame.q: no column \"frame.q\"; did you mean \"frame.x\"?" },
+    { "run ezyroller --of frame.x --error", "--error compares complete runs: it cannot be given together with --of" },
+    { "sweep ezyroller --vary M0=1:2 --vary omega=1:2 --vary m1=1:2 --plots @/three -o @/n.csv",
+      "--plots: figures show one or two varied quantities, not 3" },
+    { "steady pendulum -o a.png",
+      "-o a.png: the format .png is not written: expected a name that ends in .csv, .npz or .json" },
     { "run ezyroller --start m1=1", "--start m1=1: m1 is a parameter, expected a state; use --set" },
     { "run ezyroller --set m1=-1", "model ezyroller: parameter m1 = -1: expected a number > 0" },
     { "run ezyroller --set m1=nan", "model ezyroller: parameter m1 = nan: expected a finite number" },
@@ -142,7 +157,8 @@ TEST (no_folder) {
   assert_int_equal (cli_run ("pinwheel compare ezyroller --reference @/none.csv -o @/kept/study"), 2);
   cli_good ("ls @/kept");
   assert_string_equal (cli_out, "");
-  assert_int_equal (cli_run ("pinwheel steady ezyroller -o @/kept"), 2);
+  assert_int_equal (cli_run ("pinwheel steady ezyroller -o @/kept/steady.csv --json @/kept/steady.json --plots @/kept"),
+                    2);
   cli_good ("rmdir @/kept");
 }
 

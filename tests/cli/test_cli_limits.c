@@ -105,7 +105,8 @@ TEST (rows) {
   cli_shell ("pinwheel sweep ezyroller --vary M0=1e-9,0.1 --method erk8 --t-end 10 --max-steps 20 -o @/n.csv");
   assert_non_null (strstr (cli_err, "1 of 2 runs failed, the first of them: "));
   assert_non_null (strstr (cli_err, "max-steps"));
-  cli_shell ("pinwheel drift ezyroller --methods rk4,erk8 --only-methods --t-end 100 --step 1e-4 --limit 0.1 -o @/d");
+  cli_shell (
+      "pinwheel drift ezyroller --methods rk4,erk8 --only-methods --t-end 100 --step 1e-4 --limit 0.1 --plots @/d");
   assert_non_null (strstr (cli_out, "\nerk8 "));
   assert_non_null (strstr (cli_out, "the limit of 0.1 s of processor time is reached (--limit)"));
 }

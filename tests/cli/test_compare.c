@@ -15,7 +15,7 @@
 /* Rows come in the order of the methods, decades of tolerances, halves of steps. */
 TEST (rows) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection,ida+ggl,erk5:steps=fixed " SHORT
-            " -o @/rows && cut -d, -f1-4 @/rows/compare.csv && ls @/rows");
+            " --plots @/rows && cut -d, -f1-4 @/rows/compare.csv && ls @/rows");
   const char *table = strstr (cli_out, "method,ladder");
   assert_non_null (table);
   assert_string_equal (
@@ -37,7 +37,7 @@ TEST (rows) {
 /* Fixed-step methods converge at their order, against a reference that is better than all of them. */
 TEST (orders) {
   cli_good ("pinwheel compare ezyroller --methods rk4+none,rk4+projection,erk5+projection:steps=fixed --t-end 2 "
-            "--step-ladder 0.1:0.02 --repeats 3 -o @/order");
+            "--step-ladder 0.1:0.02 --repeats 3 --plots @/order");
   const double order[3] = { 4, 4, 5 };
   for (int m = 0; m < 3; m++)
     for (int column = MOST; column < MOST + 2; column++) {
@@ -59,14 +59,15 @@ TEST (orders) {
 
 /* Steps that follow a tolerance are nowhere in an asymptotic range; here two orders of 8 agree. */
 TEST (no_adaptive_order) {
-  cli_good ("pinwheel compare pendulum --methods erk5+projection --rtol-ladder 1e-3:1e-6 --repeats 1 -o @/adaptive");
+  cli_good (
+      "pinwheel compare pendulum --methods erk5+projection --rtol-ladder 1e-3:1e-6 --repeats 1 --plots @/adaptive");
   for (int row = 0; row < 4; row++) assert_string_equal (compare_cell ("adaptive/compare.csv", row, ORDER), "nan");
 }
 
 /* Outside the asymptotic range, here next to the reference's uncertainty, levels disagree and no order is given. */
 TEST (no_order) {
   cli_good ("pinwheel compare ezyroller --methods erk5+projection:steps=fixed --t-end 2 --step-ladder 0.05:0.0125 "
-            "--repeats 3 -o @/round");
+            "--repeats 3 --plots @/round");
   assert_string_equal (compare_cell ("round/compare.csv", 2, BELOW), "");
   for (int row = 0; row < 3; row++) assert_string_equal (compare_cell ("round/compare.csv", row, ORDER), "nan");
 }
@@ -75,7 +76,7 @@ TEST (no_order) {
  * fits. */
 TEST (uncertain_order) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection --t-end 2 --step-ladder 0.02:0.0003 --repeats 1 "
-            "-o @/uncertain >@/table");
+            "--plots @/uncertain >@/table");
   double uncertainty = compare_number ("uncertain/compare.csv", 6, MOST);
   assert_non_null (strstr (compare_cell ("uncertain/compare.csv", 6, BELOW), "largest.length"));
   for (int row = 2; row < 7; row++) {
@@ -89,7 +90,7 @@ TEST (uncertain_order) {
  * quarter of a second, as many repeats follow anyway.) */
 TEST (repeats) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection -t 2 --reference @/known.csv --step-ladder 4e-6:4e-6 "
-            "--specialise never --limit 1000 -o @/long >@/table");
+            "--specialise never --limit 1000 --plots @/long >@/table");
   assert_true (compare_number ("long/compare.csv", 0, REPEATS) >= 3);
   assert_true (compare_number ("long/compare.csv", 0, SPREAD) >= 0);
 }
@@ -100,7 +101,7 @@ TEST (row_is_run) {
   for (int m = 0; m < 3; m++) {
     cli_good (check_text (
         "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 "
-        "--reference @/known.csv -o @/as-run "
+        "--reference @/known.csv --plots @/as-run "
         ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
         method[m], method[m]));
     const struct {
@@ -121,7 +122,7 @@ TEST (row_is_run) {
 TEST (reference) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection --reference @/known.csv --repeats 1 --step-ladder "
             "0.05:0.025 "
-            "-o @/t");
+            "--plots @/t");
   assert_non_null (strstr (cli_out, "as if it were exact"));
   assert_true (compare_number ("t/compare.csv", 0, TIME) == 2);
   assert_true (compare_number ("t/compare.csv", 0, MOST) > 1e-8);
@@ -131,10 +132,10 @@ TEST (reference) {
   /* a table with some columns compares these alone */
   cli_good ("cut -d, -f1,4 @/known.csv >@/few.csv && pinwheel compare ezyroller --methods rk4 --reference @/few.csv "
             "--repeats 1 --t-end "
-            "1 --step-ladder 0.05 -o @/few");
+            "1 --step-ladder 0.05 --plots @/few");
   cli_good (
       "cp @/few.csv @/few && pinwheel compare ezyroller --methods rk4 --reference @/few/few.csv --repeats 1 --t-end 1 "
-      "--step-ladder 0.05 -o @/few >@/table"); /* a file of the folder that is not written */
+      "--step-ladder 0.05 --plots @/few >@/table"); /* a file of the folder that is not written */
   assert_string_equal (compare_cell ("few/compare.csv", 0, END), "nan");
   assert_true (compare_number ("few/compare.csv", 0, END + 1) > 0);
   assert_string_equal (compare_cell ("few/compare.csv", 0, MULTIPLIER), "nan");
@@ -144,7 +145,7 @@ TEST (reference) {
  * sample is no error of theirs, and does not keep the reference from telling those at the other samples. */
 TEST (jump) {
   cli_good ("pinwheel compare tests/scenes/shove.yaml --methods rk4+projection,ida+ggl --step-ladder 0.01 "
-            "--rtol-ladder 1e-6 --repeats 1 -o @/jump >@/table");
+            "--rtol-ladder 1e-6 --repeats 1 --plots @/jump >@/table");
   for (int i = 0; i < 2; i++) {
     double error = compare_number ("jump/compare.csv", i, MULTIPLIER);
     assert_true (error > 0 && error < 1e-3); /* the jump is 1 */
@@ -152,16 +153,18 @@ TEST (jump) {
   cli_write ("jumps.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1}]\nelements:\n"
                            "  - {pin: p, body: [b, ground], at: [[-1, 0], [-1, 0]]}\n"
                            "  - {torque: T, body: [b, ground], value: \"sign(sin(2*pi*t))\"}\n");
-  cli_good ("pinwheel compare @/jumps.yaml -t 100 --methods rk4 --step-ladder 0.1 --repeats 1 -o @/jumps >@/table && "
-            "sed -n 's/.*uncertainty.*,//p' @/jumps/truth.csv");
+  cli_good (
+      "pinwheel compare @/jumps.yaml -t 100 --methods rk4 --step-ladder 0.1 --repeats 1 --plots @/jumps >@/table && "
+      "sed -n 's/.*uncertainty.*,//p' @/jumps/truth.csv");
   assert_string_equal (cli_out, "0\n"); /* every sample is at a jump: multipliers are not compared */
 }
 
 /* Eight methods by default; every integrator with one stabilisation. */
 TEST (presets) {
-  cli_good ("pinwheel compare ezyroller" ONCE "--t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 -o @/usual >@/table; "
+  cli_good ("pinwheel compare ezyroller" ONCE
+            "--t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 --plots @/usual >@/table; "
             "pinwheel compare ezyroller --methods all+ggl,rk4+all,all+ggl" ONCE "--t-end 0.5 --step-ladder 0.01 "
-            "--rtol-ladder 1e-6 -o @/ggl >@/table; tail -n +2 @/usual/compare.csv | wc -l; "
+            "--rtol-ladder 1e-6 --plots @/ggl >@/table; tail -n +2 @/usual/compare.csv | wc -l; "
             "tail -n +2 @/ggl/compare.csv | cut -d, -f1");
   assert_string_equal (cli_out, "8\nida+ggl\nradau+ggl\ngalpha+ggl\nrk4+none\nrk4+baumgarte\nrk4+projection\n"
                                 "rk4+nullspace\n");
@@ -179,7 +182,7 @@ TEST (multiplier_scale) {
             "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n  - {gravity: g, acceleration: [0, -10]}\n",
             i ? 1024 : 1, i ? 1024 : 1));
     cli_good ("pinwheel compare @/double.yaml --methods rk4+projection --t-end 0.5 --step-ladder 0.02 --repeats 1 "
-              "-o @/double >@/table");
+              "--plots @/double >@/table");
     error[i] = compare_number ("double/compare.csv", 0, MULTIPLIER);
   }
   assert_true (error[0] > 0 && error[1] == error[0]);
@@ -189,9 +192,10 @@ TEST (multiplier_scale) {
  * claims. */
 TEST (own_reference) {
   const double x[3] = { 0.122485077560987708, -0.0509563103339871023, -0.0717230785643341303 };
-  cli_good ("pinwheel compare ezyroller --methods rk4 --step-ladder 0.1 --t-end 2 --repeats 1 -o @/own >@/table && "
-            "head -2 @/own/truth.csv | tail -1 | cut -d, -f4,5; "
-            "pinwheel run ezyroller --method erk8+projection --rtol 3e-14 --t-end 2 --json @/own.json >@/table");
+  cli_good (
+      "pinwheel compare ezyroller --methods rk4 --step-ladder 0.1 --t-end 2 --repeats 1 --plots @/own >@/table && "
+      "head -2 @/own/truth.csv | tail -1 | cut -d, -f4,5; "
+      "pinwheel run ezyroller --method erk8+projection --rtol 3e-14 --t-end 2 --json @/own.json >@/table");
   assert_non_null (strstr (cli_file ("own/truth.csv"), "erk8+projection, rtol 3e-14"));
   const char *at = strstr (cli_file ("own/truth.csv"), "\"uncertainty\",");
   assert_non_null (at);
@@ -207,7 +211,7 @@ TEST (own_reference) {
 /* All methods there are: each is a row, with a reason if it does not reach the end. */
 TEST (all) {
   cli_good (
-      "pinwheel compare ezyroller --methods all" ONCE "--t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 -o @/all "
+      "pinwheel compare ezyroller --methods all" ONCE "--t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 --plots @/all "
       ">@/table; pinwheel "
       "list methods | grep -c '^    +'; tail -n +2 @/all/compare.csv | wc -l; grep -vc ',\"\"$' @/all/compare.csv "
       "|| true");
@@ -228,15 +232,15 @@ TEST (alias) {
 }
 
 TEST (limit) {
-  int status =
-      cli_run ("pinwheel compare ezyroller --methods rk4" ONCE "--t-end 2 --step-ladder 0.01:1e-8 --limit 0.1 -o @/l");
+  int status = cli_run ("pinwheel compare ezyroller --methods rk4" ONCE
+                        "--t-end 2 --step-ladder 0.01:1e-8 --limit 0.1 --plots @/l");
   assert_int_equal (status, 0);
   assert_string_equal (compare_cell ("l/compare.csv", 0, STATUS), "ok");
   assert_string_equal (compare_cell ("l/compare.csv", 18, STATUS), "not run");
   assert_string_equal (compare_cell ("l/compare.csv", 18, REASON), "\"too slow; the limit is 0.1 s\"");
   assert_string_equal (compare_cell ("l/compare.csv", 18, STEPS), "nan");
   status = cli_run ("pinwheel compare ezyroller --methods rk4" ONCE "--t-end 2 --step-ladder 1e-8 --limit 0.125 "
-                    "-o @/stop");
+                    "--plots @/stop");
   assert_int_equal (status, 4);
   assert_string_equal (compare_cell ("stop/compare.csv", 0, STATUS), "stopped");
   assert_non_null (
@@ -265,7 +269,8 @@ TEST (changed) {
 
 /* A failure keeps its row, its reason and the time reached; the others go on. */
 TEST (failure) {
-  cli_good ("pinwheel compare ezyroller --methods erk8+projection" ONCE "--t-end 1 --rtol-ladder 1e-14:1e-13 -o @/f");
+  cli_good ("pinwheel compare ezyroller --methods erk8+projection" ONCE
+            "--t-end 1 --rtol-ladder 1e-14:1e-13 --plots @/f");
   assert_string_equal (compare_cell ("f/compare.csv", 0, STATUS), "ok");
   assert_string_equal (compare_cell ("f/compare.csv", 1, STATUS), "refused");
   assert_non_null (strstr (compare_cell ("f/compare.csv", 1, REASON), "round-off allows no less"));
@@ -279,7 +284,7 @@ TEST (failure) {
 TEST (interrupt) {
   int status = cli_run (
       "\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --methods rk4" ONCE
-      "--t-end 2 --step-ladder 0.1:1e-8 --limit 100 -o @/i &\n"
+      "--t-end 2 --step-ladder 0.1:1e-8 --limit 100 --plots @/i &\n"
       "p=$!; while kill -0 $! 2>/dev/null && ! grep -q '^rk4' @/i/compare.csv.part 2>/dev/null; do sleep 0.05; done\n"
       "kill -TERM $p; wait $p; test $? = 130 && ls @/i");
   assert_int_equal (status, 0);
@@ -292,7 +297,7 @@ TEST (interrupt) {
 TEST (jobs) {
   cli_good ("for j in 1 2 5; do\n"
             "  pinwheel compare pendulum --methods galpha+ggl,rk4,erk5,bdf,ida+none " SHORT
-            " --jobs $j -o @/j$j || exit 1\n"
+            " --jobs $j --plots @/j$j || exit 1\n"
             "  cut -d, -f1-24 @/j$j/compare.csv >@/j$j.csv\n"
             "done\n"
             "cmp @/j1.csv @/j2.csv && cmp @/j1.csv @/j5.csv");
@@ -371,7 +376,7 @@ TEST (bad) {
   cli_write ("short.csv", "t,frame.x\n1,0\n");
   cli_bad_each ("compare", bad, sizeof bad / sizeof *bad);
   cli_write ("file", "");
-  cli_bad ("pinwheel compare ezyroller -o @/file/x", 1, "cannot make the folder @/file/x: Not a directory");
+  cli_bad ("pinwheel compare ezyroller --plots @/file/x", 1, "cannot make the folder @/file/x: Not a directory");
 }
 
 /* The table of a run. */

@@ -46,7 +46,7 @@ TEST (costs) {
   static const char *const error[] = { "1e-3", "1e-6", "1e-9" };
   const int rows = 6; /* of each method; the second one does not reach 6 digits, none reaches 9 */
   cli_good ("pinwheel compare pendulum --methods erk5+projection,ida+ggl --t-end 10 --rtol-ladder 1e-3:1e-8 "
-            "--repeats 1 -o @/end");
+            "--repeats 1 --plots @/end");
   assert_null (strstr (cli_out, "residual of"));
   assert_non_null (strstr (cli_out, "the largest error of a coordinate at 100 times up to 10 s, relative to\n1 m "
                                     "(lengths), 1 rad (angles). The reference has 14."));
@@ -75,7 +75,7 @@ TEST (bounds) {
             "--repeats 1");
   assert_string_equal (compare_word ("rk4+projection", 0), "<1.0");
   assert_string_equal (compare_word ("rk4+projection", 2), "1.0");
-  assert_non_null (strstr (cli_out, "\n<: at most"));
+  assert_non_null (strstr (cli_out, "\n< marks an upper bound: "));
   assert_non_null (strstr (cli_out, "\nstopped by the limit of 0.05 s: rk4+projection from "));
   /* the run with steps of 0.05 s fails: how many digits it would have is unknown */
   cli_write ("fails.c", "#include <math.h>\n#include \"pinwheel.h\"\nstatic _Thread_local double before;\n"

@@ -50,7 +50,7 @@ static double drift_number (const char *file, const char *method, int column) {
  * stay at round-off, and with feedback within bounds. */
 TEST (growth) {
   cli_good ("pinwheel drift pendulum --t-end 40 --step 0.005 --methods rk4+none,rk4+baumgarte,rk4+projection "
-            "--only-methods -o @/growth");
+            "--only-methods --plots @/growth");
   const char *f = "growth/drift.csv";
   check_close ("growth of position", drift_number (f, "rk4+none", POSITION_GROWTH), 2, 0.2, "a few swings");
   check_close ("growth of velocity", drift_number (f, "rk4+none", VELOCITY_GROWTH), 1, 0.2, "a few swings");
@@ -70,7 +70,7 @@ TEST (row_is_run) {
     char command[500];
     snprintf (
         command, sizeof command,
-        "pinwheel drift snakeboard --methods %s --t-end 2 --step 0.01 --rtol 1e-5 --only-methods -o @/as >@/out1; "
+        "pinwheel drift snakeboard --methods %s --t-end 2 --step 0.01 --rtol 1e-5 --only-methods --plots @/as >@/out1; "
         "pinwheel run snakeboard --method %s --t-end 2 --step 0.01 --rtol 1e-5 --json -",
         method[m], method[m]);
     cli_good (command);
@@ -87,20 +87,20 @@ TEST (row_is_run) {
 
 /* Every stabilisation of an integrator, each once; by default those of three. */
 TEST (all_of_one) {
-  cli_good ("pinwheel drift pendulum --t-end 0.1 --methods rk4+none,rk4+all --only-methods -o @/one >@/out1; "
+  cli_good ("pinwheel drift pendulum --t-end 0.1 --methods rk4+none,rk4+all --only-methods --plots @/one >@/out1; "
             "tail -n +2 @/one/drift.csv | cut -d, -f2");
   assert_string_equal (cli_out, "rk4+none\nrk4+baumgarte\nrk4+projection\nrk4+nullspace\n");
-  cli_good ("pinwheel drift pendulum --t-end 0.1 --only-methods -o @/usual >@/out1; "
+  cli_good ("pinwheel drift pendulum --t-end 0.1 --only-methods --plots @/usual >@/out1; "
             "tail -n +2 @/usual/drift.csv | cut -d, -f2 | sed 's/+.*//' | uniq");
   assert_string_equal (cli_out, "rk4\nida\ngalpha\n");
 }
 
 /* What the options do: seldom projections leave more, and a grid of alpha and beta has all its rows. */
 TEST (options) {
-  cli_good (
-      "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+projection --vary alpha=0,5 --vary "
-      "beta=1:100:3:log --vary every=1,4,16 -o @/options && tail -n +2 @/options/drift.csv | cut -d, -f1 | uniq -c "
-      "| tr -s ' ' && ls @/options");
+  cli_good ("pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+projection --vary alpha=0,5 --vary "
+            "beta=1:100:3:log --vary every=1,4,16 --plots @/options && tail -n +2 @/options/drift.csv | cut -d, -f1 | "
+            "uniq -c "
+            "| tr -s ' ' && ls @/options");
   assert_non_null (
       strstr (cli_out,
               " 1 methods\n 6 baumgarte\n 6 projection\n"
@@ -123,7 +123,7 @@ TEST (options) {
 /* Where options of a stabilisation vary, the integrator keeps its own, not those of its stabilisation in --methods. */
 TEST (integrator_options) {
   cli_good ("pinwheel drift pendulum --t-end 1 --step 0.01 --vary alpha=5 --vary beta=10 --vary every=4 "
-            "--methods galpha+ggl,erk5+projection:every=2:steps=fixed:inputs=held -o @/own");
+            "--methods galpha+ggl,erk5+projection:every=2:steps=fixed:inputs=held --plots @/own");
   const char *f = "own/drift.csv";
   assert_true (drift_number (f, "erk5+baumgarte:alpha=5:beta=10:steps=fixed:inputs=held", STEPS) == 100);
   assert_true (drift_number (f, "erk5+projection:metric=mass:every=4:steps=fixed:inputs=held", STEPS) == 100);
@@ -132,7 +132,8 @@ TEST (integrator_options) {
 /* Each method of the curves against time has its points, the last one at the end. */
 TEST (times) {
   cli_good (
-      "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+none,ida+ggl --only-methods -o @/times >@/out1; "
+      "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+none,ida+ggl --only-methods --plots @/times "
+      ">@/out1; "
       "grep -c '^rk4+none,' @/times/drift-time.csv; grep '^ida+ggl,' @/times/drift-time.csv | tail -1 | cut -d, -f2");
   assert_string_equal (cli_out, "200\n2\n");
 }
@@ -141,7 +142,7 @@ TEST (times) {
 TEST (failure) {
   cli_good (
       "pinwheel drift ezyroller --t-end 2 --step 0.02 --methods rk4+none --vary alpha=10,1000 --vary beta=10 --vary "
-      "every=1 -o @/f");
+      "every=1 --plots @/f");
   assert_string_equal (drift_cell ("f/drift.csv", "rk4+baumgarte:alpha=10:beta=10", STATUS), "ok");
   assert_string_equal (drift_cell ("f/drift.csv", "rk4+baumgarte:alpha=1000:beta=10", STATUS), "failed");
   double t = drift_number ("f/drift.csv", "rk4+baumgarte:alpha=1000:beta=10", TIME);
@@ -152,7 +153,7 @@ TEST (failure) {
 /* Interrupted in the middle: rows done stay. */
 TEST (interrupt) {
   int status =
-      cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 4 --step 1e-3 --vary every=1,2 -o @/i &\n"
+      cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 4 --step 1e-3 --vary every=1,2 --plots @/i &\n"
                "p=$!; while kill -0 $! 2>/dev/null && ! grep -q '^methods,rk4' @/i/drift.csv.part 2>/dev/null; do "
                "sleep 0.02; done\n"
                "kill -TERM $p; wait $p; test $? = 130 && ls @/i");
@@ -177,15 +178,15 @@ TEST (interrupt_gap) {
 /* No figure against alpha if it is 0, which a logarithmic axis does not show. */
 TEST (alpha_zero) {
   cli_good ("pinwheel drift pendulum --t-end 0.1 --step 0.01 --methods rk4 --vary alpha=0 --vary beta=1 --vary every=1 "
-            "-o @/zero && test ! -e @/zero/drift-baumgarte.gp");
+            "--plots @/zero && test ! -e @/zero/drift-baumgarte.gp");
 }
 
 /* Rows that have been written are kept, and named. */
 TEST (kept) {
-  assert_int_equal (cli_run ("(ulimit -f 2; pinwheel drift pendulum --t-end 1 --step 0.01 -o @/full)"), 1);
+  assert_int_equal (cli_run ("(ulimit -f 2; pinwheel drift pendulum --t-end 1 --step 0.01 --plots @/full)"), 1);
   assert_non_null (strstr (cli_err, "pinwheel: the runs so far are kept in "));
   assert_non_null (cli_file ("full/drift.csv.part"));
-  assert_int_equal (cli_run ("(ulimit -f 20; pinwheel drift pendulum --only-methods --t-end 1 -o @/time)"), 1);
+  assert_int_equal (cli_run ("(ulimit -f 20; pinwheel drift pendulum --only-methods --t-end 1 --plots @/time)"), 1);
   assert_non_null (strstr (cli_err, "time/drift-time.csv.part\n"));
 }
 
@@ -214,10 +215,10 @@ TEST (bad) {
 TEST (jobs) {
   cli_good (
       "pinwheel drift pendulum --t-end 2 --methods ida+ggl,rk4+projection,erk5+none,bdf+projection --only-methods "
-      "--jobs 1 -o @/jobs1");
+      "--jobs 1 --plots @/jobs1");
   cli_good (
       "pinwheel drift pendulum --t-end 2 --methods ida+ggl,rk4+projection,erk5+none,bdf+projection --only-methods "
-      "--jobs 3 -o @/jobs3");
+      "--jobs 3 --plots @/jobs3");
   char *one = strdup (cli_file ("jobs1/drift.csv"));
   assert_string_equal (cli_file ("jobs3/drift.csv"), one);
   free (one);

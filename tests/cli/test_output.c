@@ -43,7 +43,7 @@ TEST (uses) {
     { "run ezyroller -o M.csv --reference ./M.csv", "-o M.csv would overwrite --reference, ./M.csv" },
     { "run ezyroller --plots D --json D/energy.dat", "--plots D would overwrite --json, D/energy.dat" },
     { "run ezyroller --plots D --json D/energy.dat.part", "--plots D would overwrite --json, D/energy.dat.part" },
-    { "compare ezyroller -o D --reference D/compare.csv", "-o D would overwrite --reference, D/compare.csv" },
+    { "compare ezyroller --plots D --reference D/compare.csv", "--plots D would overwrite --reference, D/compare.csv" },
     { "sweep ./car.yaml --vary m=1,2 -o car.yaml", "-o car.yaml would overwrite the model, @/u/car.yaml" },
     { "sweep ./table.yaml --vary a.x=1,2 -o M.csv", "-o M.csv would overwrite a file of the model, @/u/M.csv" },
     { "sweep --merge M.csv -o ./M.csv", "-o ./M.csv would overwrite the part, M.csv" },

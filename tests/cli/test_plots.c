@@ -179,14 +179,16 @@ TEST (analyses) {
     ".x=1e-5 --free stiffness_of_the_torsion_spring --plots @/l",
     "optimise @/long.yaml --maximise max:" LONG
     ".omega --free stiffness_of_the_torsion_spring=1:5 --starts 2 --plots @/l",
-    "sensitivity @/long.yaml --of " LONG ".omega --by stiffness_of_the_torsion_spring --by c -o @/l",
-    "periodic @/long.yaml --set c=0 --period free --guess 3 --vary stiffness_of_the_torsion_spring=4:5 -o @/l",
-    "steady @/long.yaml --vary stiffness_of_the_torsion_spring=1:5 -o @/l",
+    "sensitivity @/long.yaml --of " LONG ".omega --by stiffness_of_the_torsion_spring --by c --plots @/l",
+    "periodic @/long.yaml --set c=0 --period free --guess 3 --vary stiffness_of_the_torsion_spring=4:5 -o "
+    "@/l/periodic.csv --json @/l/periodic.json --plots @/l",
+    "steady @/long.yaml --vary stiffness_of_the_torsion_spring=1:5 -o @/l/steady.csv --json @/l/steady.json --plots "
+    "@/l",
     "run @/rest.yaml --every 0.05 -o @/l.csv",
     "fit @/rest.yaml --data @/l.csv --columns " LONG ".phi --free " LONG ".omega --plots @/l",
     "optimise @/rest.yaml --maximise " LONG ".phi --free c=0:1 --starts 1 --plots @/l",
-    "sensitivity @/rest.yaml --of " LONG ".phi --by c -o @/l",
-    "periodic @/rest.yaml --set c=0 --period 1 -o @/l"
+    "sensitivity @/rest.yaml --of " LONG ".phi --by c --plots @/l",
+    "periodic @/rest.yaml --set c=0 --period 1 -o @/l/periodic.csv --json @/l/periodic.json --plots @/l"
   };
   static const char *const figure[] = { NULL, "fit", "optimise", "sensitivity", "periodic", "steady",
                                         NULL, "fit", "optimise", "sensitivity", "periodic" };
@@ -255,7 +257,9 @@ TEST (gnuplot_interrupted) {
   static const char *const commands[] = {
     "optimise pendulum --minimise bob.y --free I=0:1 -t 0.1 --starts 1 --json @/stop/o.json --plots @/stop",
     "fit pendulum --data @/stop/data.csv --columns bob.phi --free g --plots @/stop --json @/stop/o.json",
-    "run pendulum -t 0.1 --plots @/stop --json @/stop/o.json", "sensitivity pendulum --of bob.x --by g -t 0.1 -o @/stop"
+    "run pendulum -t 0.1 --plots @/stop --json @/stop/o.json",
+    "sensitivity pendulum --of bob.x --by g -t 0.1 -o @/stop/sensitivity.csv --json @/stop/sensitivity.json --plots "
+    "@/stop"
   };
   cli_good ("mkdir -p @/stop/bin && printf '#!/bin/sh\\nkill -INT $PPID; exit 1\\n' >@/stop/bin/gnuplot && chmod +x "
             "@/stop/bin/gnuplot && pinwheel run pendulum -t 1 --every 0.1 -o @/stop/data.csv");
@@ -368,7 +372,7 @@ TEST (style) {
   cli_bad ("pinwheel run ezyroller --plots @/style --width 85", 2, "--width 85: expected a length such as 85mm");
   cli_bad ("pinwheel run ezyroller --plots @/style --width 1mm", 2, "--width 1mm: expected 50mm to 500mm");
   cli_bad ("pinwheel run ezyroller --plots @/style --colour red", 2, "--colour red: expected body or time");
-  cli_bad ("pinwheel compare ezyroller -o @/style --width xmm", 2, "--width: \"x\" is not a number");
+  cli_bad ("pinwheel compare ezyroller --plots @/style --width xmm", 2, "--width: \"x\" is not a number");
 }
 
 /* In a narrow figure the legend of eleven methods, whose last one is galpha+ggl, ends above the frame of the first
@@ -379,7 +383,8 @@ TEST (legend) {
   for (int i = 0; i < 3; i++) {
     double last = 0, frame = 0;
     snprintf (command, sizeof command,
-              "pinwheel drift pendulum --t-end 1 --step 0.01 --only-methods --width %s -o @/legend%d", width[i], i);
+              "pinwheel drift pendulum --t-end 1 --step 0.01 --only-methods --width %s --plots @/legend%d", width[i],
+              i);
     cli_good (command);
     snprintf (command, sizeof command, "legend%d/drift.svg", i);
     for (const char *at = cli_file (command); (at = strpbrk (at + 1, "<'")) != NULL;) {

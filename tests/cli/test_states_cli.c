@@ -46,7 +46,8 @@ TEST (every_command) {
   cli_good ("pinwheel run @/a.yaml -t 1 --start f=1");
   cli_good ("pinwheel sweep @/a.yaml -t 1 --vary f=0:1:3 -o @/s.csv");
   assert_non_null (strstr (cli_file ("s.csv"), "f [N]"));
-  cli_good ("pinwheel sensitivity @/a.yaml -t 1 --by lag --by f --of f --of block.x -o @/sens");
+  cli_good ("pinwheel sensitivity @/a.yaml -t 1 --by lag --by f --of f --of block.x -o @/sens/sensitivity.csv --json "
+            "@/sens/sensitivity.json --plots @/sens");
   cli_shell ("pinwheel compare @/a.yaml -t 1 --methods rk4,erk8");
   cli_good ("pinwheel run @/a.yaml -t 1 --specialise always");
 }
@@ -61,7 +62,7 @@ TEST (round_trip) {
 /* The state x = Re (X exp (2 i t)), f = Re (F exp (2 i t)) with F = 1/(1 + 0.6 i), X = F/(0.8 i). */
 TEST (periodic) {
   cli_write ("a.yaml", actuator);
-  cli_good ("pinwheel periodic @/a.yaml --period pi -o @/per");
+  cli_good ("pinwheel periodic @/a.yaml --period pi -o @/per/periodic.csv --json @/per/periodic.json --plots @/per");
   const char *json = cli_file ("per/periodic.json");
   check_close ("f", cli_number (json, "start", "f", NULL), 0.7352941176470589, 1e-12, "the search's rtol");
   check_close ("x", cli_number (json, "start", "block.x", NULL), -0.5514705882352942, 1e-12, "the search's rtol");

@@ -106,8 +106,8 @@ TEST (sweep) {
 
 TEST (drift) {
   faults_most = 30;
-  faults_from (":", "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
-  faults_from (":", "steady n-trailer --starts 0 -o @/o");
+  faults_from (":", "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods --plots @/o");
+  faults_from (":", "steady n-trailer --starts 0 -o @/o/steady.csv --json @/o/steady.json --plots @/o");
 }
 
 TEST (reading) {

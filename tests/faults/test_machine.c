@@ -17,8 +17,8 @@ static const char *const machine_writers[] = {
   "run ezyroller --t-end 2 -m erk5+projection --every 0.002 -o @/o/a.csv --checkpoint @/o/a.ck --checkpoint-every 0.3",
   "run ezyroller --t-end 1 --plots @/o",
   "sweep ezyroller --t-end 0.1 --vary omega=1:3:100 --jobs 2 -o @/o/a.csv",
-  "compare ezyroller --t-end 0.5 --methods rk4 --limit 5 --step-ladder 0.1:0.025 -o @/o",
-  "drift ezyroller --t-end 0.5 --methods rk4+none,rk4+projection --only-methods -o @/o",
+  "compare ezyroller --t-end 0.5 --methods rk4 --limit 5 --step-ladder 0.1:0.025 --plots @/o",
+  "drift ezyroller --t-end 0.5 --methods rk4+none,rk4+projection --only-methods --plots @/o",
   "new @/o/mine.yaml",
 };
 enum { MACHINE_WRITERS = sizeof machine_writers / sizeof *machine_writers };

@@ -224,10 +224,10 @@ TEST (run) {
 
 TEST (studies) {
   memory_each (0, "sweep ezyroller --vary a=0.5,0.6 --t-end 0.01 --step 0.01 --jobs 1 -o @/o/a.csv");
-  memory_each (0, "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
-  memory_each (0, "steady n-trailer --starts 0 -o @/o");
-  memory_each (0, "periodic pendulum --period free -o @/o");
-  memory_each (0, "compare pendulum --t-end 0.01 --methods rk4 --step-ladder 0.01:0.005 -o @/o");
+  memory_each (0, "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods --plots @/o");
+  memory_each (0, "steady n-trailer --starts 0 -o @/o/steady.csv --json @/o/steady.json --plots @/o");
+  memory_each (0, "periodic pendulum --period free -o @/o/periodic.csv --json @/o/periodic.json --plots @/o");
+  memory_each (0, "compare pendulum --t-end 0.01 --methods rk4 --step-ladder 0.01:0.005 --plots @/o");
 }
 
 /* One job: threads would allocate in any order. */

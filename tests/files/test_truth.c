@@ -102,7 +102,7 @@ TEST (compare) {
  * names the part if it is a table; `run` names it. */
 TEST (partial) {
 #define PARTIAL " --methods rk4+projection --repeats 1 --step-ladder 0.1:0.05"
-  cli_good ("pinwheel compare car-two-trailers -t 2 -o @/part" PARTIAL);
+  cli_good ("pinwheel compare car-two-trailers -t 2 --plots @/part" PARTIAL);
   cli_shows (
       "the model's own reference solution contains at all times only car.phi of 9 coordinates: a computed one is used\n"
       "errors are measured against erk8+projection, rtol 3e-14\n");

@@ -294,7 +294,9 @@ static void line_trial (const line_model *m) {
                                       "elements:\n  - {slider: s, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
                                       "  - {force: F, body: b, fx: '%s'}\n",
                                       t_end, value[0], value[1], value[2], value[3], value[4], value[5], m->force));
-  cli_shell (check_text ("pinwheel sensitivity @/line.yaml %s%s -o @/sens --every 100", line_of, by));
+  cli_shell (check_text ("pinwheel sensitivity @/line.yaml %s%s -o @/sens/sensitivity.csv --json "
+                         "@/sens/sensitivity.json --plots @/sens --every 100",
+                         line_of, by));
   count = cli_sensitivity ("derivative", derivative);
   assert_int_equal (count, LINE_OUTPUTS * used);
   assert_int_equal (cli_sensitivity ("error", error), count);
@@ -342,7 +344,7 @@ TEST (sleigh) {
       sprintf (set + strlen (set), " --set %s=%.17g --by %s", name[j], value, name[j]);
     }
     cli_shell (check_text ("pinwheel sensitivity chaplygin-sleigh --of sleigh.phi --of sleigh.omega -t %.17g%s -o "
-                           "@/sens --every 100",
+                           "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens --every 100",
                            t, set));
     assert_int_equal (cli_sensitivity ("derivative", derivative), 10);
     assert_int_equal (cli_sensitivity ("error", error), 10);
@@ -418,7 +420,8 @@ static void scene_check (scene_trial *x, int event) {
   char of[2000] = "", what[500];
   scene_choose (x);
   for (int i = 0; i < SCENE_OUTPUTS; i++) sprintf (of + strlen (of), " --of %s", x->output[i]);
-  cli_shell (check_text ("pinwheel sensitivity %s%s --set %s=%.17g --set %s=%.17g --by %s --by %s -t %.17g -o @/sens "
+  cli_shell (check_text ("pinwheel sensitivity %s%s --set %s=%.17g --set %s=%.17g --by %s --by %s -t %.17g -o "
+                         "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens "
                          "--every 100 2>&1",
                          x->file, of, x->parameter[0], x->value[0], x->parameter[1], x->value[1], x->parameter[0],
                          x->parameter[1], x->t_end));

@@ -17,7 +17,9 @@ static void derivatives_write (const char *parameters, double v0, const char *fo
 /* Checks the derivatives of a sensitivity command of it, of the first output by all parameters, ... */
 static void derivatives_check (const char *options, int count, const double *expected, double of_expected) {
   double x[CLI_MOST], error[CLI_MOST];
-  cli_shell (check_text ("pinwheel sensitivity @/line.yaml %s -o @/sens --every 100", options));
+  cli_shell (check_text ("pinwheel sensitivity @/line.yaml %s -o @/sens/sensitivity.csv --json @/sens/sensitivity.json "
+                         "--plots @/sens --every 100",
+                         options));
   assert_int_equal (cli_sensitivity ("derivative", x), count);
   assert_int_equal (cli_sensitivity ("error", error), count);
   for (int i = 0; i < count; i++) {
@@ -106,22 +108,25 @@ TEST (gust) {
 TEST (kink) {
   double x, error;
   derivatives_write ("{name: p, value: 1}", 0, "fx: 'max (p, 1)'");
-  cli_shell ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   assert_non_null (strstr (cli_out, "  no derivative at p = 1: 0 from below, 2 from above\n"));
   cli_sensitivity ("derivative", &x);
   assert_true (isnan (x));
   for (int i = 1; i < 8; i++)
     for (int side = -1; side <= 1; side += 2) {
       const double away = side * pow (10, -i);
-      cli_shell (
-          check_text ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens --set p=%.17g", 1 + away));
+      cli_shell (check_text ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens/sensitivity.csv --json "
+                             "@/sens/sensitivity.json --plots @/sens --set p=%.17g",
+                             1 + away));
       cli_sensitivity ("derivative", &x);
       cli_sensitivity ("error", &error);
       check_close ("beside the kink", x, side > 0 ? 2 : 0, error, "the claim");
       check_below ("its error", error, 1e-2, "round-off of 2 m over steps of 1e-8");
     }
   derivatives_write ("{name: p, value: 1}", 0, "fx: 'p >= 1 ? 1 : 2'");
-  cli_shell ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   cli_sensitivity ("derivative", &x);
   assert_true (isnan (x));
 }

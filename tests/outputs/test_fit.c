@@ -412,8 +412,8 @@ TEST (bad) {
     { "@/wheel.yaml --data @/word.csv --columns w.phi --free k",
       "@/word.csv:3: column 2: expected a finite number, found \"many\"" },
   };
-  cli_bad (FIT "--free k -o @/f.npz", 2,
-           "-o @/f.npz: this command writes no NumPy archives: expected a name that ends in .csv");
+  cli_bad (FIT "--free k -o @/f.txt", 2,
+           "-o @/f.txt: the format .txt is not written: expected a name that ends in .csv, .npz or .json");
   cli_write ("two.csv", "t,w.phi\n1,0\n2,0.1\n3,nan\n");
   cli_write ("mixed.csv", "t,w.phi,w.omega\n1,0,0\n2,0.1,0\n");
   cli_write ("word.csv", "t,w.phi\n1,0\n2,many\n");

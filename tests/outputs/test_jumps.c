@@ -20,7 +20,7 @@ TEST (closed_form) {
                           "elements:\n  - {force: f, body: a, fx: 'a.x > w ? -F : 0'}\n");
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
     cli_shell (check_text ("pinwheel sensitivity @/jump.yaml --of a.x --of f.work --of mean:f.work --by a.vx --by F "
-                           "--by w -t 2 -o @/sens -m %s",
+                           "--by w -t 2 -o @/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens -m %s",
                            methods[i]));
     assert_string_equal (cli_err,
                          "pinwheel: force f: fx: \"a.x > w\" may jump as states change; steps do not end there, "
@@ -37,7 +37,8 @@ TEST (extremum) {
   double x[2], error[2];
   cli_write ("least.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 2}}\n"
                            "elements:\n  - {force: f, body: a, fx: 'a.x > 1 ? 1 : -1'}\n");
-  cli_shell ("pinwheel sensitivity @/least.yaml --of min:a.vx --by a.vx -t 2 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/least.yaml --of min:a.vx --by a.vx -t 2 -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   cli_sensitivity ("derivative", x);
   cli_sensitivity ("error", error);
   check_close ("least velocity", x[0], sqrt (2), error[0], "v0 / v");
@@ -47,7 +48,8 @@ TEST (extremum) {
 /* Derivatives of outputs of a model by a parameter against extrapolated differences of accurate runs. */
 static void jumps_compare (const char *file, const char *outputs, const char *by, double value, double step) {
   static const char command[] =
-      "pinwheel sensitivity @/%s --every 1 %s --by %s --set %s=%.17g -o @/sens -m erk8 --rtol 1e-11 --atol "
+      "pinwheel sensitivity @/%s --every 1 %s --by %s --set %s=%.17g -o @/sens/sensitivity.csv --json "
+      "@/sens/sensitivity.json --plots @/sens -m erk8 --rtol 1e-11 --atol "
       "1e-13";
   double derivative[CLI_MOST], x[4][CLI_MOST];
   cli_shell (check_text (command, file, outputs, by, by, value));
@@ -111,12 +113,13 @@ TEST (narrow_friction) {
              "  - {spring: S, body: [a, ground], at: [[0, 0], [-5, 0]], stiffness: k, length: 5}\n"
              "  - {sliding-friction: f, body: [a, ground], at: [[0, 0], [0, 0]], limit: 0.5, speed: 0.001}\n");
   jumps_compare ("friction.yaml", "--of a.x", "k", 100, 1e-2);
-  cli_shell (
-      "pinwheel sensitivity @/friction.yaml --every 1 --of a.x --by k -o @/sens -m erk8 --rtol 1e-11 --atol 1e-13");
+  cli_shell ("pinwheel sensitivity @/friction.yaml --every 1 --of a.x --by k -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens -m erk8 --rtol 1e-11 --atol 1e-13");
   assert_int_equal (cli_sensitivity ("derivative", &expected), 1);
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    cli_shell (
-        check_text ("pinwheel sensitivity @/friction.yaml --every 1 --of a.x --by k -o @/sens -m %s", methods[i]));
+    cli_shell (check_text ("pinwheel sensitivity @/friction.yaml --every 1 --of a.x --by k -o @/sens/sensitivity.csv "
+                           "--json @/sens/sensitivity.json --plots @/sens -m %s",
+                           methods[i]));
     assert_int_equal (cli_sensitivity ("derivative", &x), 1);
     assert_int_equal (cli_sensitivity ("error", &error), 1);
     check_below (methods[i], fabs (x - expected), 10 * error + 0.01 * expected,
@@ -141,10 +144,12 @@ TEST (refusals) {
   assert_non_null (strstr (cli_err, "pinwheel: no method is accurate enough for derivatives: t = 1."));
   assert_int_equal (cli_run ("pinwheel sensitivity @/stop.yaml --of a.x --by F -t 2 -m rk4"), 4);
   assert_non_null (strstr (cli_err, "pinwheel: no method is accurate enough for derivatives: t = 1."));
-  cli_shell ("pinwheel sensitivity @/stop.yaml --set F=1 --set v=0 --of a.x --by v -t 2 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/stop.yaml --set F=1 --set v=0 --of a.x --by v -t 2 -o @/sens/sensitivity.csv "
+             "--json @/sens/sensitivity.json --plots @/sens");
   assert_non_null (strstr (cli_out, "  no derivative at v = 0: 0.66667 from below, 2 from above\n"));
   assert_non_null (strstr (cli_file ("sens/sensitivity.json"), "\"derivative\": null"));
-  cli_shell ("pinwheel sensitivity @/stop.yaml --set F=1 --set v=0 --of a.x --by F -t 2 -m erk8 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/stop.yaml --set F=1 --set v=0 --of a.x --by F -t 2 -m erk8 -o "
+             "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens");
   double x;
   assert_int_equal (cli_sensitivity ("derivative", &x), 1);
   check_close ("da.x/dF", x, 2, 1e-6, "t^2/2");
@@ -162,9 +167,9 @@ TEST (crossings) {
                            "  - {force: g, body: a, fx: {harmonic: {amplitude: 5, omega: 3}}}\n");
   for (int i = 0; i < 20; i++)
     for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
-      cli_shell (check_text (
-          "pinwheel sensitivity @/turns.yaml -t 2 --every 1 --of a.x --by a.vx --start a.vx=%.17g -m %s -o @/sens",
-          0.24 + 1e-3 * i, methods[k]));
+      cli_shell (check_text ("pinwheel sensitivity @/turns.yaml -t 2 --every 1 --of a.x --by a.vx --start a.vx=%.17g "
+                             "-m %s -o @/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens",
+                             0.24 + 1e-3 * i, methods[k]));
       assert_int_equal (cli_sensitivity ("derivative", &x), 1);
       if (k == 0) expected = x;
       check_close (methods[k], x, expected, 1e-3 * fabs (expected), "ten times the largest tolerance");
@@ -197,7 +202,8 @@ TEST (periodic) {
   }
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++) J[i][j] = (map[2 * j][i] - map[2 * j + 1][i]) / (2 * step);
-  cli_shell ("pinwheel periodic @/forced.yaml --period 2*pi/3 -m erk8 --rtol 1e-9 -o @/per");
+  cli_shell ("pinwheel periodic @/forced.yaml --period 2*pi/3 -m erk8 --rtol 1e-9 -o @/per/periodic.csv --json "
+             "@/per/periodic.json --plots @/per");
   const char *at = strstr (cli_out, "modulus ");
   assert_non_null (at);
   check_close ("modulus", strtod (at + 8, NULL), sqrt (J[0][0] * J[1][1] - J[0][1] * J[1][0]), 1e-5,

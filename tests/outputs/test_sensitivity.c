@@ -29,7 +29,8 @@ TEST (sleigh) {
                                      -23.1682436429820667965804011701, -3.52690525296758368801569681518,
                                      -1.6156668371657765493636643037 };
   double x[CLI_MOST], error[CLI_MOST];
-  cli_good ("pinwheel sensitivity chaplygin-sleigh --of sleigh.phi --by m --by I --by a --by u0 --by w0 -o @/sens");
+  cli_good ("pinwheel sensitivity chaplygin-sleigh --of sleigh.phi --by m --by I --by a --by u0 --by w0 -o "
+            "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens");
   assert_int_equal (sensitivity_last (x), 7);
   for (int i = 0; i < 5; i++)
     check_close ("derivative", x[2 + i], expected[i], 1e-8 * fabs (expected[i]),
@@ -45,9 +46,9 @@ TEST (sleigh) {
 /* The motion of a pendulum is a function of t sqrt (g/l): dphi/dl = -omega t / (2 l), dphi/dg = omega t / (2 g). */
 TEST (pendulum) {
   double x[CLI_MOST];
-  cli_good (
-      "pinwheel sensitivity pendulum --of bob.phi --of bob.omega --by l --by g -o @/sens --method erk8+projection "
-      "--rtol 1e-11");
+  cli_good ("pinwheel sensitivity pendulum --of bob.phi --of bob.omega --by l --by g -o @/sens/sensitivity.csv --json "
+            "@/sens/sensitivity.json --plots @/sens --method erk8+projection "
+            "--rtol 1e-11");
   assert_int_equal (sensitivity_last (x), 7);
   check_close ("dphi/dl", x[2], -x[4] * 10 / 2, 2e-8 * fabs (x[2]), "steps of 1e-9, 10 s");
   check_close ("dphi/dg", x[3], x[4] * 10 / (2 * 9.81), 2e-8 * fabs (x[3]), "steps of 1e-9, 10 s");
@@ -56,7 +57,8 @@ TEST (pendulum) {
 /* x = g sin (alpha) sin^2 (w t) / (2 w^2) on the incline: blade and gravity. */
 TEST (incline) {
   double x[CLI_MOST], s = sin (10), k = s * s / 2, y = (10 - sin (20) / 2) / 2;
-  cli_good ("pinwheel sensitivity knife-edge-incline --of skate.x --of skate.y --by g --by alpha --by w -o @/sens");
+  cli_good ("pinwheel sensitivity knife-edge-incline --of skate.x --of skate.y --by g --by alpha --by w -o "
+            "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens");
   assert_int_equal (sensitivity_last (x), 9);
   check_close ("dx/dg", x[2], 0.5 * k, 1e-8, "steps of 1e-9, 10 s");
   check_close ("dx/dalpha", x[3], 9.81 * cos (PW_PI / 6) * k, 1e-8, "steps of 1e-9, 10 s");
@@ -81,7 +83,9 @@ static const char sensitivity_outputs[] = " --of frame.x --of rider.work --of A.
 
 static void sensitivity_values (const char *name, double value, double *out) {
   char command[800];
-  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by M0 --%s=%.17g -o @/sens",
+  snprintf (command, sizeof command,
+            "pinwheel sensitivity ezyroller -t 3%s--by M0 --%s=%.17g -o @/sens/sensitivity.csv --json "
+            "@/sens/sensitivity.json --plots @/sens",
             sensitivity_outputs, name, value);
   double all[CLI_MOST];
   cli_shell (command); /* initial values changed by the constraints are reported */
@@ -91,7 +95,9 @@ static void sensitivity_values (const char *name, double value, double *out) {
 
 static void sensitivity_compare (const char *by, const char *name, double value, double step) {
   double derivative[CLI_MOST], x[4][13];
-  cli_good (check_text ("pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens", sensitivity_outputs, by));
+  cli_good (check_text ("pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens/sensitivity.csv --json "
+                        "@/sens/sensitivity.json --plots @/sens",
+                        sensitivity_outputs, by));
   assert_int_equal (cli_sensitivity ("derivative", derivative), 13);
   for (int k = 0; k < 4; k++) sensitivity_values (name, value + (k < 2 ? k - 2 : k - 1) * step, x[k]);
   for (int i = 0; i < 13; i++) {
@@ -119,7 +125,8 @@ TEST (parameters) {
       "bodies:\n  - {name: free, mass: 1, inertia: 1}\n  - {name: driven, mass: 1, inertia: I, start: {phi: 1}}\n"
       "elements:\n  - {torque: T, body: [free, ground], value: exp(s - 40 + z)}\n"
       "  - {drive: D, body: [driven, ground], what: angle, value: {harmonic: {amplitude: 1, omega: 1}}}\n");
-  cli_good ("pinwheel sensitivity @/wheels.yaml --of free.phi --of D.work --by s --by z --by I -t 2 -o @/sens");
+  cli_good ("pinwheel sensitivity @/wheels.yaml --of free.phi --of D.work --by s --by z --by I -t 2 -o "
+            "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 6);
   assert_int_equal (cli_sensitivity ("error", error), 6);
   check_close ("dphi/ds", x[0], 2, error[0], "the claim");
@@ -137,12 +144,14 @@ TEST (oscillation) {
              "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1.1}}\n"
              "elements:\n  - {spring: S, body: [ground, a], at: [[0, 0], [0, 0]], stiffness: 3943.84, damping: c, "
              "length: 1}\n");
-  cli_good ("pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens --every 20");
+  cli_good ("pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens/sensitivity.csv "
+            "--json @/sens/sensitivity.json --plots @/sens --every 20");
   assert_int_equal (cli_sensitivity ("derivative", x), 2);
   for (int i = 0; i < 2; i++) {
-    cli_good (
-        i ? "pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens --set c=0.0505"
-          : "pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens --set c=0.0495");
+    cli_good (i ? "pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o "
+                  "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens --set c=0.0505"
+                : "pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o "
+                  "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens --set c=0.0495");
     assert_int_equal (cli_sensitivity ("value", value[i]), 4);
   }
   for (int i = 0; i < 2; i++)
@@ -154,7 +163,8 @@ TEST (oscillation) {
 TEST (jumping_integrals) {
   static const char command[] =
       "pinwheel sensitivity @/rod.yaml --of integral:A.Fx --of rms:A.Fx --of mean:A.Fy --of F.work "
-      "--by s --by w -o @/sens -m erk8+projection --rtol 1e-11 --set s=%g --set w=%g";
+      "--by s --by w -o @/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens -m erk8+projection --rtol "
+      "1e-11 --set s=%g --set w=%g";
   double x[CLI_MOST], value[2][CLI_MOST];
   char text[400];
   cli_write ("rod.yaml", "pinwheel: 1\nrun: {t_end: 2}\nparameters:\n  - {name: s, value: 0.5, unit: s}\n"
@@ -199,8 +209,10 @@ TEST (pulse) {
       "  - {force: F, body: block, at: [0, 0], fx: {pulse: {height: 2, start: s, width: 0.5}}}\n"
       "  - {spring: K, body: [block, ground], at: [[0, 0], [0, 0]], stiffness: 60, damping: 2.4, length: 0.8}\n");
   for (int i = 0; i < 2; i++) {
-    cli_good (i ? "pinwheel sensitivity @/pulse.yaml --of K.loss --by s -t 2 --every 0.05 -o @/sens"
-                : "pinwheel sensitivity @/pulse.yaml --of K.loss --by s -t 2 --every 0.001 -o @/sens");
+    cli_good (i ? "pinwheel sensitivity @/pulse.yaml --of K.loss --by s -t 2 --every 0.05 -o @/sens/sensitivity.csv "
+                  "--json @/sens/sensitivity.json --plots @/sens"
+                : "pinwheel sensitivity @/pulse.yaml --of K.loss --by s -t 2 --every 0.001 -o @/sens/sensitivity.csv "
+                  "--json @/sens/sensitivity.json --plots @/sens");
     assert_int_equal (sensitivity_last (x[i]), 3);
     check_close ("loss", x[i][2], -0.0511971431, 1e-9, "extrapolated differences of runs, 9 digits");
   }
@@ -208,7 +220,8 @@ TEST (pulse) {
              "pinwheel: 1\nparameters:\n  - {name: M, value: 1, unit: N m}\n"
              "bodies:\n  - {name: block, mass: 1, inertia: 1}\nelements:\n"
              "  - {torque: T, body: [block, ground], value: {pulse: {height: M, start: 0.35, width: 0.3}}}\n");
-  cli_good ("pinwheel sensitivity @/spin.yaml --of mean:block.omega --by M -t 1 --every 1e9 -o @/sens");
+  cli_good ("pinwheel sensitivity @/spin.yaml --of mean:block.omega --by M -t 1 --every 1e9 -o @/sens/sensitivity.csv "
+            "--json @/sens/sensitivity.json --plots @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x[0]), 1);
   check_close ("mean", x[0][0], 0.15, 1e-9, "0.3 s of angular acceleration at 0.5 s, whatever the rows of the table");
 }
@@ -224,9 +237,10 @@ TEST (extremum) {
                            "  - {force: f, body: a, fx: {pulse: {height: 1, start: p, width: 100}}}\n"
                            "  - {force: g, body: a, fx: {pulse: {height: -1, start: q, width: 100}}}\n");
   for (int i = 0; i < 2; i++) {
-    cli_good (i ? "pinwheel sensitivity @/steps.yaml --of max:a.x --by p -t 4 -m erk8+none --rtol 1e-9 -o @/sens"
+    cli_good (i ? "pinwheel sensitivity @/steps.yaml --of max:a.x --by p -t 4 -m erk8+none --rtol 1e-9 -o "
+                  "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens"
                 : "pinwheel sensitivity @/steps.yaml --of max:a.x --by p -t 4 -m erk8+none --rtol 1e-9 --set q=1.4 "
-                  "-o @/sens");
+                  "-o @/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens");
     assert_int_equal (cli_sensitivity ("derivative", slope + i), 1);
     check_close ("slope", slope[i], -sin (2 * (t - p)) / 2, 1e-7, "rtol 1e-9");
   }
@@ -241,8 +255,10 @@ TEST (beside_breakpoint) {
                           "  - {force: F, body: rod, fx: 5*t}\n"
                           "  - {force: P, body: rod, fx: {pulse: {height: h, start: 0.2, width: 0.3}}}\n");
   for (int i = 0; i < 2; i++) {
-    cli_good (i ? "pinwheel sensitivity @/held.yaml --of max:A.Fx --by h -t 0.55 -o @/sens"
-                : "pinwheel sensitivity @/held.yaml --of A.Fx --by h -t 0.2 -o @/sens");
+    cli_good (i ? "pinwheel sensitivity @/held.yaml --of max:A.Fx --by h -t 0.55 -o @/sens/sensitivity.csv --json "
+                  "@/sens/sensitivity.json --plots @/sens"
+                : "pinwheel sensitivity @/held.yaml --of A.Fx --by h -t 0.2 -o @/sens/sensitivity.csv --json "
+                  "@/sens/sensitivity.json --plots @/sens");
     assert_int_equal (cli_sensitivity ("derivative", slope + i), 1);
     check_close ("slope", slope[i], 1, 1e-9, "round-off of differences");
   }
@@ -251,7 +267,8 @@ TEST (beside_breakpoint) {
 /* ---- Files ---- */
 
 TEST (files) {
-  cli_good ("pinwheel sensitivity pendulum --of bob.x --of max:bob.x --by l -t 1 --every 0.25 -o @/sens");
+  cli_good ("pinwheel sensitivity pendulum --of bob.x --of max:bob.x --by l -t 1 --every 0.25 -o "
+            "@/sens/sensitivity.csv --json @/sens/sensitivity.json --plots @/sens");
   const char *csv = cli_file ("sens/sensitivity.csv"), *head = "t [s],bob.x [m],d(bob.x)/d(l) [m per m]\n";
   int lines = 0;
   assert_int_equal (strncmp (csv, head, strlen (head)), 0);
@@ -261,13 +278,15 @@ TEST (files) {
   assert_true (cli_says (json, "model", "pendulum"));
   assert_true (cli_says (json, "output", "bob.x"));
   assert_true (cli_says (json, "unit", "m"));
-  cli_good ("pinwheel sensitivity roller-racer --of rear.x --of seat.x --by a -t 3 -o @/sens");
+  cli_good ("pinwheel sensitivity roller-racer --of rear.x --of seat.x --by a -t 3 -o @/sens/sensitivity.csv --json "
+            "@/sens/sensitivity.json --plots @/sens");
   double x[2];
   assert_int_equal (cli_sensitivity ("error", x), 2);
   check_close ("error of a contact point", x[0] / x[1], 1, 0.1, "0.1 m from the centre of mass");
   assert_non_null (strstr (json, "\"complete\": true"));
   assert_non_null (cli_file ("sens/sensitivity.svg"));
-  cli_good ("pinwheel sensitivity pendulum --of 2*bob.x --by l -t 1 -o @/sens");
+  cli_good ("pinwheel sensitivity pendulum --of 2*bob.x --by l -t 1 -o @/sens/sensitivity.csv --json "
+            "@/sens/sensitivity.json --plots @/sens");
   assert_non_null (strstr (cli_file ("sens/sensitivity.gp"), "label_1 = 'l × ∂/∂l'\n"));
 }
 
@@ -278,7 +297,9 @@ TEST (long_names) {
   char sum[600] = "bob.phi";
   while (strlen (sum) < 400) strcat (sum, "+bob.phi");
   char column[2000];
-  cli_good (check_text ("pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum, sum));
+  cli_good (check_text ("pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens/sensitivity.csv "
+                        "--json @/sens/sensitivity.json --plots @/sens",
+                        sum, sum));
   snprintf (column, sizeof column, "t [s],%s,d(%s)/d(m),%s-1,d(%s-1)/d(m)\n", sum, sum, sum, sum);
   assert_int_equal (strncmp (cli_file ("sens/sensitivity.csv"), column, strlen (column)), 0);
 }

@@ -20,7 +20,9 @@ TEST (steps) {
              "  - {gravity: G, acceleration: [0, -9.81]}\n");
   for (int dl = 0; dl < 2; dl++)
     for (int i = -1; i < 4; i++) {
-      snprintf (command, sizeof command, "pinwheel sensitivity @/small.yaml --of %s --by %s --set %s=%s -o @/sens",
+      snprintf (command, sizeof command,
+                "pinwheel sensitivity @/small.yaml --of %s --by %s --set %s=%s -o @/sens/sensitivity.csv --json "
+                "@/sens/sensitivity.json --plots @/sens",
                 dl ? "c.phi" : "b.omega", dl ? "dl" : "p", dl ? "dl" : "p", i < 0 ? "0" : value[i]);
       cli_shell (command);
       cli_sensitivity ("derivative", &x);
@@ -36,7 +38,8 @@ TEST (steps) {
                     "bodies: [{name: b, mass: 1, inertia: 1, start: {x: %s}}]\n"
                     "elements:\n  - {force: F, body: b, fx: '-sin(20*(b.x - x0))'}\n",
                     place[i], place[i]));
-    cli_shell ("pinwheel sensitivity @/large.yaml --of b.x --by x0 -o @/sens");
+    cli_shell ("pinwheel sensitivity @/large.yaml --of b.x --by x0 -o @/sens/sensitivity.csv --json "
+               "@/sens/sensitivity.json --plots @/sens");
     cli_sensitivity ("derivative", &x);
     cli_sensitivity ("error", &error);
     check_close (place[i], x, 1 - cos (2 * sqrt (20)), error, "a linear oscillation near x0");
@@ -53,13 +56,15 @@ TEST (no_effect) {
              "bodies: [{name: A, mass: m, inertia: 0.1, start: {phi: 0.5}, rate: {omega: 1}}]\n"
              "elements:\n  - {pin: a, body: [ground, A], at: [[0, 0], [-0.4, 0]]}\n"
              "  - {gravity: g, acceleration: [0, -9.81]}\n");
-  cli_shell ("pinwheel sensitivity @/mass.yaml --of A.phi --by m -o @/sens");
+  cli_shell ("pinwheel sensitivity @/mass.yaml --of A.phi --by m -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 1);
   check_close ("mass", x[0], -0.239878189, 1e-8, "differences of DOP853 in another program");
   cli_write ("none.yaml", "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-9}\nparameters: [{name: p, value: 3}]\n"
                           "bodies: [{name: B, mass: 1, inertia: 0.1, rate: {vx: 1}}]\n"
                           "elements:\n  - {force: F, body: B, fx: '-1e6*(B.x - t) - 1e3*(B.vx - 1)', fy: '0*p'}\n");
-  cli_shell ("pinwheel sensitivity @/none.yaml --of B.x --of B.y --by p -o @/sens");
+  cli_shell ("pinwheel sensitivity @/none.yaml --of B.x --of B.y --by p -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 2);
   assert_int_equal (cli_sensitivity ("error", error), 2);
   for (int i = 0; i < 2; i++) assert_true (x[i] == 0);
@@ -75,14 +80,16 @@ TEST (energies) {
              "bodies:\n  - {name: heavy, mass: 1e5, inertia: 1, start: {y: 100}, rate: {vx: 100}}\n"
              "  - {name: light, mass: 1, inertia: 1, rate: {vx: 0.01}}\n"
              "elements:\n  - {force: T, body: light, fy: F}\n  - {gravity: g, acceleration: [0, -9.81]}\n");
-  cli_shell ("pinwheel sensitivity @/energy.yaml --of kinetic --of potential --by F -o @/sens");
+  cli_shell ("pinwheel sensitivity @/energy.yaml --of kinetic --of potential --by F -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 2);
   check_close ("kinetic", x[0], (0.001 - 9.81) * 4, 1e-8, "F - m g, by t^2, and the error of the run");
   check_close ("potential", x[1], 9.81 * 2, 1e-5,
                "m g t^2 / 2, and round-off of 9.81e7 J in differences along the state");
   cli_write ("flight.yaml", "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 2}]\n"
                             "bodies: [{name: b, mass: m, inertia: 1, rate: {vx: 3}}]\n");
-  cli_shell ("pinwheel sensitivity @/flight.yaml --of kinetic --by m -o @/sens");
+  cli_shell ("pinwheel sensitivity @/flight.yaml --of kinetic --by m -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 1);
   check_close ("kinetic by mass", x[0], 4.5, 1e-9, "v^2 / 2, and round-off of differences");
 }
@@ -113,7 +120,9 @@ TEST (run_error) {
       "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 350.7, damping: 31.1, length: 10}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     double x, error;
-    cli_shell (check_text ("pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens --method %s", method[i]));
+    cli_shell (check_text ("pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens/sensitivity.csv --json "
+                           "@/sens/sensitivity.json --plots @/sens --method %s",
+                           method[i]));
     cli_sensitivity ("derivative", &x);
     cli_sensitivity ("error", &error);
     check_close (method[i], x, expected, error, "the claim");
@@ -133,7 +142,9 @@ TEST (light_body) {
       "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 1.9e5, damping: 4430, length: 10}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     double x;
-    cli_shell (check_text ("pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens --method %s", method[i]));
+    cli_shell (check_text ("pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens/sensitivity.csv --json "
+                           "@/sens/sensitivity.json --plots @/sens --method %s",
+                           method[i]));
     cli_sensitivity ("derivative", &x);
     check_below (method[i], fabs (x), 1e-4, "the error of the run's velocities, over m");
   }
@@ -155,7 +166,8 @@ TEST (own_error) {
   for (int i = 0; i < 2; i++)
     for (size_t k = 0; k < sizeof method / sizeof *method; k++) {
       double x, error;
-      cli_shell (check_text ("pinwheel sensitivity @/double.yaml --of a.phi --by p -o @/sens --t-end %d --method %s",
+      cli_shell (check_text ("pinwheel sensitivity @/double.yaml --of a.phi --by p -o @/sens/sensitivity.csv --json "
+                             "@/sens/sensitivity.json --plots @/sens --t-end %d --method %s",
                              3 + i, method[k]));
       cli_sensitivity ("derivative", &x);
       cli_sensitivity ("error", &error);
@@ -168,7 +180,8 @@ TEST (own_error) {
  * in 80-bit numbers), and by more than all digits in 40 s. */
 TEST (chaos) {
   double x, error;
-  cli_shell ("pinwheel sensitivity chain --of link1.x --by l -o @/sens");
+  cli_shell ("pinwheel sensitivity chain --of link1.x --by l -o @/sens/sensitivity.csv --json @/sens/sensitivity.json "
+             "--plots @/sens");
   cli_sensitivity ("derivative", &x);
   cli_sensitivity ("error", &error);
   assert_true (error > 0.01 * fabs (x));
@@ -179,11 +192,13 @@ TEST (chaos) {
              "  - {name: b, mass: 1, inertia: 0.1, start: {x: 3*l}}\n"
              "elements:\n  - {pin: A, body: [ground, a], at: [[0, 0], [-l, 0]]}\n"
              "  - {pin: B, body: [a, b], at: [[l, 0], [-l, 0]]}\n  - {gravity: g, acceleration: [0, -9.81]}\n");
-  cli_shell ("pinwheel sensitivity @/double.yaml --of b.x --by l -t 20 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/double.yaml --of b.x --by l -t 20 -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   cli_sensitivity ("derivative", &x);
   cli_sensitivity ("error", &error);
   check_close ("20 s", x, 9.0481e6, error, "the claim");
-  cli_shell ("pinwheel sensitivity @/double.yaml --of b.x --by l -t 40 -o @/sens");
+  cli_shell ("pinwheel sensitivity @/double.yaml --of b.x --by l -t 40 -o @/sens/sensitivity.csv --json "
+             "@/sens/sensitivity.json --plots @/sens");
   cli_sensitivity ("derivative", &x);
   assert_true (isnan (x));
   assert_non_null (strstr (cli_out, "unknown"));

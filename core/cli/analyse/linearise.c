@@ -446,7 +446,7 @@ static int linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *e
 /* Indices in the list of files of linearise_open_files; 0 is the model. */
 enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
 
-/* Opens the files before anything is computed.  -o NAME, an old spelling, stands for NAME.json, .csv and .npz. */
+/* Opens the files before anything is computed.  -o NAME stands for NAME.json, .csv and .npz. */
 static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
   enum { PATH = 4096 };
   static const char *const ending[] = { ".json", ".csv", ".npz" };
@@ -464,7 +464,6 @@ static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
     path[1] = pw_arena_copy (&cmd->line.arena, PW_PRINTED (PATH, "%s.csv", name));
     path[2] = pw_arena_copy (&cmd->line.arena, PW_PRINTED (PATH, "%s.npz", name));
     if (path[0] == NULL || path[1] == NULL || path[2] == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-    pw_cli_say ("pinwheel: -o %s: an old spelling, which writes %s, %s and %s\n", name, path[0], path[1], path[2]);
   }
   if (cmd->page_path && pw_animation_check ("--animate", cmd->page_path, error) != PW_OK) return error->status;
   pw_use use[] = { PW_CLI_MODEL_USE,
@@ -524,7 +523,7 @@ static const struct poptOption linearise_options[] = {
   PW_LIST_OPTION (pw_linearise_command, output_names, "output", 0, "STATE",
                   "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
   PW_TEXT_OPTION (pw_linearise_command, name, "name", 'o', "FILE",
-                  "Write FILE.csv (the matrix [A B; C D]), FILE.npz for NumPy or FILE.json"),
+                  "Write FILE.csv (the matrix [A B; C D]), FILE.npz for NumPy, FILE.json (everything), or without an ending all three"),
   PW_TEXT_OPTION (pw_linearise_command, json_path, "json", 0, "FILE", "Write everything as JSON"),
   PW_TEXT_OPTION (pw_linearise_command, page_path, "animate", 0, "FILE.html",
                   "Write a page in which the modes are animated"),
