@@ -136,7 +136,7 @@ typedef struct {
   /* private */
   poptContext popt;
   struct poptOption *options; /* a copy of the command's options, bound to its structure */
-  void **text;              /* the text or list that popt allocated for each option */
+  void **text;                /* the text or list that popt allocated for each option */
 } pw_cli_line;
 
 typedef struct {
@@ -226,7 +226,7 @@ typedef struct {
   long count;      /* 0: not given */
   int logarithmic; /* 1: both are > 0 */
 } pw_range;
-/* Reads "[NAME=]LOW:HIGH[:COUNT][:log]", or the old spelling "NAME=lin:LOW:HIGH:COUNT" (or log:) with a notice; `option`
+/* Reads "[NAME=]LOW:HIGH[:COUNT][:log]", or with a notice the old spelling "NAME=lin:LOW:HIGH:COUNT" (log:); `option`
  * begins messages.  PW_INPUT. */
 int pw_cli_range (const char *option, const char *text, pw_range *range, pw_error *error);
 

@@ -106,7 +106,8 @@ int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_e
 /* Reads the command line.  PW_OK; 1 if help was requested and has been printed; or a negative status. */
 static int command_read (const pw_command *command, pw_cli_line *line, int argc, const char **argv, pw_error *error) {
   errno = 0;
-  if (command_bind (line, command->options) == PW_OK) line->popt = poptGetContext (argv[0], argc, argv, line->options, 0);
+  if (command_bind (line, command->options) == PW_OK)
+    line->popt = poptGetContext (argv[0], argc, argv, line->options, 0);
   if (line->popt == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int number = poptGetNextOpt (line->popt);
   for (; number > 0 && number != COMMAND_HELP; number = poptGetNextOpt (line->popt))

@@ -59,8 +59,8 @@ TEST (bad_lines) {
     { "run pure-pursuit --set steer=0.1",
       "--set steer=0.1: expected a parameter; initial values of states are given by --start" },
     { "run tests/models/arms.yaml --set a_A=1", "--set a_A=1: A is a parameter of an included file; the model sets "
-                                                 "it by \"set: {A: NAME}\" in the entry of that "
-                                                 "file, from a parameter NAME of its own" },
+                                                "it by \"set: {A: NAME}\" in the entry of that "
+                                                "file, from a parameter NAME of its own" },
     { "run ezyroller --until 'frame.x > 2 m'",
       "--until frame.x > 2 m: \"m\" after a number: write it without a unit, in SI units, angles in rad or as 90*deg" },
     { "sweep n-trailer --vary n=1,2 --of trailer2.x -t 1 -o @/n.csv",

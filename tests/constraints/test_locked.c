@@ -128,8 +128,9 @@ TEST (round_off_allows_no_motion) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&locked_across_table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
-  check_error (&error, PW_INITIAL,
-               "model scene: the given velocities would have to be removed entirely: wheel wheel allows no such motion");
+  check_error (
+      &error, PW_INITIAL,
+      "model scene: the given velocities would have to be removed entirely: wheel wheel allows no such motion");
   pw_system_free (s);
 }
 

@@ -523,7 +523,8 @@ static const struct poptOption linearise_options[] = {
   PW_LIST_OPTION (pw_linearise_command, output_names, "output", 0, "STATE",
                   "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
   PW_TEXT_OPTION (pw_linearise_command, name, "name", 'o', "FILE",
-                  "Write FILE.csv (the matrix [A B; C D]), FILE.npz for NumPy, FILE.json (everything), or without an ending all three"),
+                  "Write FILE.csv (the matrix [A B; C D]), FILE.npz for NumPy, FILE.json (everything), or without an "
+                  "ending all three"),
   PW_TEXT_OPTION (pw_linearise_command, json_path, "json", 0, "FILE", "Write everything as JSON"),
   PW_TEXT_OPTION (pw_linearise_command, page_path, "animate", 0, "FILE.html",
                   "Write a page in which the modes are animated"),

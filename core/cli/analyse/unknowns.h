@@ -35,8 +35,8 @@ typedef struct {
 /* Reads the options of runs; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
-/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH[:log]" of --free, ended by NULL.  PW_INPUT for a name that the model
- * does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
+/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH[:log]" of --free, ended by NULL.  PW_INPUT for a name that the
+ * model does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
 int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
 /* Finds the unknowns of a list of names of --by, ended by NULL; values of initial states are those of the consistent
  * initial state.  PW_INPUT for a name that the model does not have, that is given twice or that is a count; else as

@@ -33,7 +33,8 @@ typedef struct {
   long rows;
 } pw_grid;
 
-/* Reads "NAME=RANGE" or "NAME=V1,V2,..."; the arrays of the axis are in the arena.  PW_INPUT with the reason, PW_RESOURCE. */
+/* Reads "NAME=RANGE" or "NAME=V1,V2,..."; the arrays of the axis are in the arena.  PW_INPUT with the reason,
+ * PW_RESOURCE. */
 int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error);
 double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 
