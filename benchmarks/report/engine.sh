@@ -11,14 +11,16 @@ split () {
 engine_tables () {
   split | awk -F '\t' '
     function short(x) { return x == "" ? "" : sprintf(x >= 1000 ? "%.0f" : "%.4g", x) }
-    BEGIN { OFS = FS; print "| what | by hand or general [ns] | Pinwheel [ns] | ratio | instructions | Pinwheel | ratio |"
-            print "|---|---|---|---|---|---|---|" }
+    BEGIN { OFS = FS; print "| what | by hand or general [ns] | Pinwheel [ns] | ratio | of instructions |"
+            print "|---|---|---|---|---|" }
     /massless/ || /no target/ || /ida/ || /ns per body/ { next }
-    $1 ~ /specialised .right. against general/ { scene = $1; sub(/,.*/, "", scene) }
-    $1 == "one step of rk4+projection" { $1 = scene ", " $1 ", specialised (right) against general" }
+    $1 ~ /evaluation, specialised .right. against general/ { scene = $1; sub(/,.*/, "", scene); next }
+    $1 == "one step of rk4+projection" { $1 = scene ": specialised against general" }
+    { sub(/, a step of rk4.projection, runs in lanes .right. against general$/, ": in lanes against general", $1)
+      sub(/one step of rk4.projection$/, "a step", $1); sub(/one evaluation$/, "an evaluation", $1) }
     $2 ~ /^(evaluation|step|body)$/ {
       sub(/, one evaluation, per body$/, "", $1)
-      printf "| %s | %s | %s | %s | %s | %s | %s |\n", $1 ($2 == "body" ? ", one evaluation, per body" : ""), short($3), short($4), short($5), short($6), short($7), ($6 > 0 && $7 > 0 ? sprintf("%.2f", $7 / $6) : "") }'
+      printf "| %s | %s | %s | %s | %s |\n", $1 ($2 == "body" ? ", per body" : ""), short($3), short($4), short($5), ($6 > 0 && $7 > 0 ? sprintf("%.2f", $7 / $6) : "") }'
   echo
   echo '| growth with the number of bodies N | measured |'
   echo '|---|---|'

@@ -77,33 +77,6 @@ work_table () {
         print "" } }' "$work/shown"
 }
 
-# Runs that do not reach the end, by method, with their scenes; without the methods that have none.
-failure_table () {
-  echo '| method | runs that fail | scenes |'
-  echo '|---|---|---|'
-  awk -F, '
-    NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }
-    $at["group"] == "original" || $at["engine"] != "general" { next }
-    { m = $at["method"]; if (!(m in all)) order[++n] = m; all[m]++ }
-    $at["status"] == "failed" || $at["status"] == "refused" { bad[m]++; name = $at["scene"]; if (!((m, name) in count)) list[m] = list[m] " " name; count[m, name]++ }
-    END { for (i = 1; i <= n; i++) { m = order[i]; if (!bad[m]) continue
-        k = split(list[m], s, " "); text = ""
-        for (j = 1; j <= k; j++) text = text (j > 1 ? ", " : "") s[j] (count[m, s[j]] > 1 ? " " count[m, s[j]] : "")
-        printf "| `%s` | %d of %d | %s |\n", m, bad[m], all[m], text } }' "$csv"
-}
-
-# The same methods by the general engine and by specialised code: processor times for an error of 1e-6.
-engines_table () {
-  echo '| scene | `erk8+projection`, general [ms] | specialised | ratio | `bdf+projection`, general [ms] | specialised | ratio |'
-  echo '|---|---|---|---|---|---|---|'
-  awk -F '\t' '
-    $3 == "general" { general[$2, $4] = $7; next }
-    $4 == "erk8+projection" { line[++n] = $2; e[$2] = $7 }
-    $4 == "bdf+projection" { b[$2] = $7 }
-    END { for (i = 1; i <= n; i++) printf "| %s | %s | %s |\n", line[i], cell(general[line[i], "erk8+projection"], e[line[i]]), cell(general[line[i], "bdf+projection"], b[line[i]]) }
-    function cell(g, x) { return g == "-" || x == "-" || g == "" || x == "" ? "- | - | -" : sprintf("%.3g | %.3g | %.2f", g, x, x / g) }' "$work/costs"
-}
-
 # One panel per scene, in rows of three.
 work_figure () {
   scenes=$(awk -F '\t' '!seen[$2]++ { print $2 }' "$work/shown")
@@ -147,7 +120,5 @@ if [ -f "$csv" ]; then
   summary_table | section summary
   summary_figure
   work_table | section work-precision
-  failure_table | section failures
-  engines_table | section engines
   work_figure
 fi
