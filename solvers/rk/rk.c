@@ -44,6 +44,7 @@ struct pw_method_data {
   /* velocities, accelerations, and rates of the ledger's entries at the stages, then at the new state */
   double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], *stage_rate[PW_RK_STAGES];
   double *q, *v, *a, *lambda; /* the new state, laid out as in pw_run; before: q, lambda of a stage */
+  double *own;                /* the run's own array: it, d->q and d->last.q change places in each step */
   double h, last_error;       /* adaptive: size of the next step, error of the last one */
   double *weight;             /* adaptive: reciprocal tolerances: [2 j] of q_j, [2 j + 1] of v_j */
   pw_step_start last, second; /* of the last step, for samples inside it; of the second part of a divided step */
@@ -317,11 +318,21 @@ static void rk_begin_step (pw_run *r) {
   pw_store_start (&r->data->last, r);
 }
 
+static void rk_point (double *state, size_t n, double **q, double **v, double **a, double **lambda) {
+  *q = state, *v = state + n, *a = *v + n, *lambda = *a + n;
+}
+
 /* Makes the new state the state reached. */
 static void rk_accept (pw_run *r, double h, double t1, double added_energy) {
   pw_method_data *d = r->data;
-  rk_begin_step (r);
-  memcpy (r->q, d->q, pw_state_length (r->s) * sizeof *r->q);
+  const size_t n = (size_t)r->s->coords + 3, entries = (size_t)r->entries * sizeof (double);
+  double *const reached = d->q, *const spare = d->last.q;
+  d->nodes = d->samples = 0;
+  d->last.t = r->t, d->last.projected = r->projected, d->last.q = r->q;
+  memcpy (d->last.ledger, r->ledger, entries);
+  memcpy (d->last.rate, r->rate, entries);
+  rk_point (reached, n, &r->q, &r->v, &r->a, &r->lambda);
+  rk_point (spare, n, &d->q, &d->v, &d->a, &d->lambda);
   r->t = t1;
   rk_ledger (r, r->ledger, d->last.ledger, h);
   r->projected += added_energy;
@@ -875,7 +886,7 @@ static int rk_allocate (pw_method_data *d, const pw_run *r) {
   }
   d->memory = pw_alloc_arrays (array, count);
   if (d->memory == NULL) return PW_RESOURCE;
-  d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
+  rk_point (d->q, n, &d->q, &d->v, &d->a, &d->lambda);
   return PW_OK;
 }
 
@@ -883,6 +894,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_fail_memory (r->s, error);
   d->tableau = tableau;
+  d->own = r->q;
   rk_list_weights (d);
   d->holds_signals = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
@@ -896,6 +908,9 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
 }
 
 void pw_rk_close (pw_run *r) {
+  double *const own = r->data->own;
+  if (r->q != own) memcpy (own, r->q, pw_state_length (r->s) * sizeof *own);
+  rk_point (own, (size_t)r->s->coords + 3, &r->q, &r->v, &r->a, &r->lambda);
   pw_projector_close (&r->data->projector);
   free (r->data->nullspace.memory);
   free (r->data->nullspace.active_index);
