@@ -451,15 +451,16 @@ typedef struct {
  * a grip, it slides against the force grip_sliding once holding would take more than the grip. */
 typedef struct {
   const char *name, *body;
-  double at[2];        /* contact point in the body's frame [m] */
-  double heading;      /* rolling direction in the body's frame [rad] */
-  double grip;         /* largest lateral force [N]; 0: no limit */
-  double grip_sliding; /* lateral force while sliding [N], at most the grip; 0: the grip */
+  double at[2];           /* contact point in the body's frame [m] */
+  double heading;         /* rolling direction in the body's frame [rad] */
+  pw_signal grip;         /* largest lateral force [N]; constant 0: no limit */
+  pw_signal grip_sliding; /* lateral force while sliding [N], at most the grip; constant 0: the grip */
 } pw_wheel;
 
 /* Rolling wheel: the contact point moves neither across the heading nor, except by rolling, along it.  Two
  * nonholonomic constraint equations and an internal coordinate, the spin angle; its velocity is positive when
- * rolling along the heading. */
+ * rolling along the heading.  With a grip it slides once the resultant of lateral and longitudinal force would exceed
+ * the grip.  With grip or brake a third equation: the brake holds the wheel. */
 typedef struct {
   const char *name, *body;
   double at[2];       /* contact point in the body's frame [m] */
@@ -470,14 +471,16 @@ typedef struct {
                        * body's velocity */
   int specified[2];   /* 1: start, rate are specified even if 0 */
   pw_signal torque;   /* on the wheel about its axle [N m]; its reaction on the body has no effect in the plane */
+  pw_signal grip, grip_sliding; /* as of a wheel, of the resultant [N] */
+  pw_signal brake;              /* largest torque against the spin [N m], as of friction */
 } pw_rolling_wheel;
 
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body;
-  double at[2];              /* contact point in the body's frame [m] */
-  pw_signal heading;         /* rolling direction in the body's frame [rad]; with its first time derivative */
-  double grip, grip_sliding; /* as of a wheel [N] */
+  double at[2];                 /* contact point in the body's frame [m] */
+  pw_signal heading;            /* rolling direction in the body's frame [rad]; with its first time derivative */
+  pw_signal grip, grip_sliding; /* as of a wheel [N] */
 } pw_steered_wheel;
 
 /* Speed: a point's speed along a direction of its body follows a signal.  One nonholonomic constraint equation. */
@@ -533,20 +536,22 @@ typedef struct {
 /* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, as in a pin. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
-  double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
-  double speed; /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
-  double limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; 0: the limit */
+  double viscous;             /* [N m s/rad], >= 0 */
+  double speed;    /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
+  pw_signal limit; /* Coulomb torque [N m], >= 0; constant if it is smoothed */
+  pw_signal limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; constant 0: the limit */
 } pw_friction;
 
 /* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body 2,
  * as in a slider or slot. */
 typedef struct {
   const char *name, *body[2]; /* what slides, and what it slides on; "ground" for one of them */
-  double at[2][2];       /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
-  double heading;        /* direction of the line in body 2's frame [rad] */
-  double viscous, limit; /* [N s/m]; Coulomb force [N]; >= 0 */
-  double speed;          /* below about this speed the Coulomb force is smoothed [m/s]; 0: it is exact, and holds */
-  double limit_sliding;  /* exact Coulomb force while sliding [N], at most the limit; 0: the limit */
+  double at[2][2]; /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;  /* direction of the line in body 2's frame [rad] */
+  double viscous;  /* [N s/m], >= 0 */
+  double speed;    /* below about this speed the Coulomb force is smoothed [m/s]; 0: it is exact, and holds */
+  pw_signal limit; /* Coulomb force [N], >= 0; constant if it is smoothed */
+  pw_signal limit_sliding; /* exact Coulomb force while sliding [N], at most the limit; constant 0: the limit */
 } pw_sliding_friction;
 
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
@@ -653,6 +658,7 @@ typedef struct pw_field {
   const char *const *choices; /* NULL-terminated names of a choice's values 0, 1, ... */
   const char *about;          /* meaning */
   size_t given; /* of an optional number: where an int of the definition is 1 if a text model gives it; 0: nowhere */
+  int limit;    /* 1: a signal that limits a multiplier (pw_bounds); not one of pw_kind.signals, after these */
 } pw_field;
 
 /* Name and unit of the reaction of a constraint equation, or of an internal coordinate. */
@@ -709,15 +715,18 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* Limits of the multiplier of a constraint equation, constants.  Between them the equation holds.  At one of them it is
+/* Limits of the multiplier of a constraint equation.  Between them the equation holds.  At one of them it is
  * not enforced: its multiplier is given, and u = J v - eta, of a holonomic equation u = g, stays >= 0 at the largest
  * multiplier, <= 0 at the smallest one. */
 typedef struct {
   double least, most;   /* multipliers with which the equation holds; both 0: it never does */
   double sliding[2];    /* those given at the smallest and at the largest one; their magnitudes are not larger */
   double restitution;   /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
+  int circle;           /* 1, 2: first, second of two equations with opposite limits, those of the resultant */
   int initially_slides; /* 1: initial velocities need not satisfy the equation, as of friction; 0: they are changed so
                          * that it holds, unless they are specified */
+  const pw_signal *signal[2]; /* of opposite limits that vary: their magnitude while the equation holds, and while it
+                               * does not, in the definition (pw_field.limit), in place of the numbers above; or NULL */
 } pw_bounds;
 
 /* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations
@@ -732,11 +741,11 @@ struct pw_kind {
   int bodies;             /* bodies of an element: those that its fields of type PW_BODY name, or 1 if each_body */
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
-  int signals;     /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
-  int each_body;   /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
-  int constant;    /* 1: its force is constant and evaluated once, when the system is compiled */
-  pw_level level;  /* of its constraint equations */
-  int first_order; /* 1: the velocities of its internal coordinates are first-order states, which have no energy */
+  int signals;   /* but those of limits; in the order of the fields; of its force if force_u is set, else of its rows */
+  int each_body; /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
+  int constant;  /* 1: its force is constant and evaluated once, when the system is compiled */
+  pw_level level;    /* of its constraint equations */
+  int first_order;   /* 1: the velocities of its internal coordinates are first-order states, which have no energy */
   int of_coordinate; /* 1: its signals, of constraints, are functions of its first internal coordinate, not of time */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
   const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" or "" */
@@ -796,9 +805,9 @@ static inline int pw_kind_acts (const pw_kind *kind) {
   return kind->rows > 0 || kind->internal > 0 || kind->force != NULL;
 }
 
-/* 1 if its signals belong to a force: they may depend on states and need no time derivatives. */
+/* 1 if its signals belong to a force, or to a limit (NULL): they may depend on states and need no time derivatives. */
 static inline int pw_kind_signals_force (const pw_kind *kind) {
-  return kind->force_u != NULL;
+  return kind == NULL || kind->force_u != NULL;
 }
 
 /* 1 if they belong to a velocity constraint and may depend on positions and first-order states. */
@@ -815,8 +824,9 @@ static inline int pw_kind_signals_feedback (const pw_kind *kind) {
 PW_KINDS
 #undef PW_KIND
 
-/* What stands for these types where Coulomb friction is exact (pw_kind.exact). */
+/* What stands for these types where Coulomb friction is exact, and where wheels slip (pw_kind.exact). */
 extern const pw_kind pw_kind_dry_friction;
+extern const pw_kind pw_kind_slipping_wheel;
 extern const pw_kind pw_kind_dry_sliding_friction;
 
 /* The built-in element types; ends with NULL. */

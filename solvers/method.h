@@ -87,6 +87,15 @@ enum { PW_FORCES_AT_LIMITS = 2 }; /* pw_run.forces: of equations that are not en
 
 struct pw_scene_step;
 
+/* Derivatives of the given multiplier of an equation. */
+typedef struct pw_given {
+  int is_given;
+  int source[2]; /* signals that it may follow; -1: none */
+  double by_source[2];
+  int first;      /* the first equation of its circle; -1: none */
+  double by_u[2]; /* by J v of the circle's equations */
+} pw_given;
+
 /* Lengths of arrays: coords, rows, entries are the numbers of coordinates, of constraint equations, and of entries of
  * the ledger, which holds the work or loss of each element that exchanges energy, then pw_settings.integrals. */
 struct pw_run {
@@ -104,8 +113,11 @@ struct pw_run {
   struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
   const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
   double *reaction;              /* rows: minus the multipliers of those, else 0; NULL without events */
-  char *events_memory;           /* of r->events */
-  pw_event *event;               /* events so far: `event_count` of them */
+  void (*update_given) (
+      struct pw_run *r);  /* sets these, and their derivatives, where J is evaluated; NULL: constants */
+  struct pw_given *given; /* rows: the derivatives; NULL without events */
+  char *events_memory;    /* of r->events */
+  pw_event *event;        /* events so far: `event_count` of them */
   long event_count;
   size_t event_room;
   struct pw_resolution *resolution; /* of signals that change within less than a step (resolution.h); NULL: none */
@@ -183,12 +195,14 @@ struct pw_run {
 /* ---- Equations that are not enforced (events.h): they have given multipliers ---- */
 
 /* f (coords + 3) += their forces, with the J last evaluated. */
-static inline void pw_add_given_forces (const pw_run *r, double *f) {
+static inline void pw_add_given_forces (struct pw_run *r, double *f) {
+  if (r->update_given) r->update_given (r);
   pw_add_JT (r->w, r->reaction, f);
 }
 
 /* Sets their multipliers. */
-static inline void pw_fill_given (const pw_run *r, double *lambda) {
+static inline void pw_fill_given (struct pw_run *r, double *lambda) {
+  if (r->update_given) r->update_given (r);
   for (int i = 0; i < r->s->rows; i++)
     if (!r->enforced[i]) lambda[i] = -r->reaction[i];
 }

@@ -286,7 +286,7 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m) {
   int elements;
   const pw_element *e = pw_model_elements (m, &elements);
   for (const pw_element *end = e + elements; e < end; e++)
-    for (int i = 0; i < e->kind->signals; i++) {
+    for (int i = 0; pw_field_at (e->kind, e->definition, PW_SIGNAL, i); i++) {
       const pw_signal *s = pw_field_at (e->kind, e->definition, PW_SIGNAL, i);
       if (s->type != PW_TABLE) continue;
       size_t bytes = (size_t)s->table.count * sizeof (double);

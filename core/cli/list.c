@@ -165,6 +165,11 @@ static void list_kind (const void *entry) {
             pw_kind_signals_force (k)      ? " and of states such as BODY.phi"
             : pw_kind_signals_feedback (k) ? ", of positions and first-order states"
                                            : "");
+  for (const pw_field *f = k->fields; f->name; f++)
+    if (f->limit) {
+      puts ("    a limit: a signal that may depend on states; or {mu: NUMBER, load: SIGNAL}, their product");
+      break;
+    }
   list_quantities ("reactions", k->reaction, k->rows);
   if (k != &pw_kind_state) list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);
 }

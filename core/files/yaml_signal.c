@@ -8,6 +8,11 @@
  *
  * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
 
+/* That whose rules signals of the current field follow; NULL: those of limits. */
+static const pw_kind *signal_kind (const pw_reader *r) {
+  return r->field->limit ? NULL : r->kind;
+}
+
 enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 
 /* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
@@ -291,7 +296,7 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
     return read_fail (r, node[0]->at,
                       "%s: the model has a number \"s\", which is also the parameter of the curve: rename it",
                       r->label);
-  f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
+  f->derivatives = pw_kind_signals_force (signal_kind (r)) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
   signal->function.open = signal_open;
   signal->function.close = signal_close;
@@ -318,7 +323,8 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
  *   {table: {file: M.csv, time: t, columns: [M]}}  the same
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi; of
  *                                                  a curve, of its parameter s
- *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given */
+ *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given
+ *   {mu: 0.8, load: ..}                            a limit: the product of a number and a signal */
 
 /* Pairs of numbers: the points of a table or a path. */
 typedef struct {
@@ -460,7 +466,7 @@ static int signal_form (pw_reader *r, const pw_signal_form *form, const pw_node 
       signal_fields (r, form, node, v, signal) != PW_OK ||
       (is_table && table_points (r, node, v + fields, signal) != PW_OK))
     return r->error->status;
-  if (*pw_signal_check (signal, r->kind, &point, fault, sizeof fault) == 0) return PW_OK;
+  if (*pw_signal_check (signal, signal_kind (r), &point, fault, sizeof fault) == 0) return PW_OK;
   const pw_node *faulty = is_table && v[fields] && point >= 0 ? v[fields]->first : NULL;
   for (int i = 0; faulty && i < point; i++) faulty = faulty->next;
   return read_fail (r, (faulty ? faulty : node)->at, "%s: %s", r->label, fault);
@@ -493,7 +499,44 @@ static int signal_map (pw_reader *r, const pw_node *node, pw_signal *signal) {
   return signal_form (r, &pw_signal_forms[form - SIGNAL_FORMS], v[form], signal);
 }
 
+/* {mu: NUMBER, load: SIGNAL}, their product, of the field of a limit. */
+static int signal_product (pw_reader *r, const pw_node *node, pw_signal *signal) {
+  static const char *const key[] = { "mu", "load", NULL };
+  const pw_node *v[2];
+  double mu;
+  if (pw_yaml_keys (r, node, key, "a limit", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL || v[1] == NULL)
+    return read_fail (r, node->at, "%s: %s is missing: expected {mu: NUMBER, load: SIGNAL}", r->label,
+                      key[v[0] != NULL]);
+  if (pw_yaml_number (r, v[0], PW_PRINTED (240, "%s: mu", r->label), PW_NONNEGATIVE, &mu) != PW_OK)
+    return r->error->status;
+  pw_node load = *v[1];
+  if (load.type == PW_YAML_SCALAR && pw_yaml_varies (r, load.text)) {
+    const size_t size = strlen (load.text) + 40;
+    char *text = pw_arena_alloc (r->arena, size);
+    if (text == NULL) return read_no_memory (r);
+    load.text = pw_print (text, size, "%.17g*(%s)", mu, load.text);
+    return pw_yaml_signal (r, &load, signal);
+  }
+  if (pw_yaml_signal (r, &load, signal) != PW_OK) return r->error->status;
+  if (signal->type == PW_FUNCTION)
+    return read_fail (r, load.at, "%s: load: write the expression alone, load: \"...\"", r->label);
+  double *const scaled[][2] = { [PW_CONSTANT] = { &signal->constant, NULL },
+                                [PW_HARMONIC] = { &signal->harmonic.amplitude, &signal->harmonic.offset },
+                                [PW_RAMP] = { &signal->ramp.from, &signal->ramp.to },
+                                [PW_SMOOTH_STEP] = { &signal->ramp.from, &signal->ramp.to },
+                                [PW_PULSE] = { &signal->pulse.height, &signal->pulse.offset },
+                                [PW_TABLE] = { &signal->table.scale, &signal->table.offset } };
+  if (signal->type == PW_TABLE && signal->table.scale == 0) signal->table.scale = 1; /* it is omitted */
+  for (int i = 0; i < 2; i++)
+    if (scaled[signal->type][i]) *scaled[signal->type][i] *= mu;
+  return PW_OK;
+}
+
 int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal) {
+  const char *first = node->type == PW_YAML_MAP && node->first ? node->first->text : "";
+  if (r->field->limit && (strcmp (first, "mu") == 0 || strcmp (first, "load") == 0))
+    return signal_product (r, node, signal);
   if (node->type == PW_YAML_MAP) return signal_map (r, node, signal);
   if (node->type == PW_YAML_SCALAR && pw_yaml_varies (r, node->text))
     return signal_of_time (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);

@@ -7,6 +7,7 @@
 #ifndef PW_BATCH_H
 #define PW_BATCH_H
 
+#include <float.h>
 #include <math.h>
 #include "pinwheel.h"
 
@@ -102,18 +103,33 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
     name, unit, NULL, about          \
   }
 
-/* Checks the limit of a multiplier while its equation holds, and that at which it does not (0: the same).  field: the
- * name of the former. */
-static inline int limit_check (const char *field, double most, double sliding, pw_error *error) {
-  if (sliding <= most) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding, field, most);
+/* 1 if a limit is a signal other than 0, its default. */
+static inline int limit_given (const pw_signal *limit) {
+  return limit->type != PW_CONSTANT || limit->constant != 0;
 }
 
-/* pw_kind.limits of a multiplier between -most and most; 0: without limits. */
-static inline void limit_both_sides (double most, double sliding, pw_bounds *limit) {
-  if (most == 0) return;
-  if (sliding == 0) sliding = most;
-  *limit = (pw_bounds){ -most, most, { -sliding, sliding }, 0, 0 };
+/* Checks the limit of a multiplier while its equation holds, and that at which it does not (default: the same), as far
+ * as they are constants.  field: the name of the former. */
+static inline int limit_check (const char *field, const pw_signal *most, const pw_signal *sliding, pw_error *error) {
+  const double largest = most->type == PW_CONSTANT ? most->constant : INFINITY;
+  if (largest < 0) return pw_fail (error, PW_INPUT, "%s = %g: expected a number >= 0", field, largest);
+  if (sliding->type == PW_CONSTANT && sliding->constant < 0)
+    return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected a number >= 0", field, sliding->constant);
+  if (sliding->type == PW_CONSTANT && sliding->constant > largest)
+    return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding->constant, field,
+                    largest);
+  if (!limit_given (most) && limit_given (sliding))
+    return pw_fail (error, PW_INPUT, "%s_sliding without %s", field, field);
+  return PW_OK;
+}
+
+/* pw_kind.limits of a multiplier between opposite limits, if they are given. */
+static inline void limit_both_sides (const pw_signal *most, const pw_signal *sliding, pw_bounds *limit) {
+  if (!limit_given (most)) return;
+  if (!limit_given (sliding)) sliding = most;
+  *limit = (pw_bounds){ -most->constant, most->constant, { -sliding->constant, sliding->constant }, .circle = 0 };
+  if (most->type != PW_CONSTANT) limit->least = -DBL_MAX, limit->most = DBL_MAX, limit->signal[0] = most;
+  if (sliding->type != PW_CONSTANT) limit->signal[1] = sliding;
 }
 
 /* The vector w of an element; NULL where the batch has none. */

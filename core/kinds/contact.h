@@ -88,12 +88,12 @@ PER_ELEMENT (contact_place, contact, 3) {
   out[2] = now.body->phi + now.constants.heading;
 }
 
-/* Fields of the definition of a wheel that may slide. */
+/* Fields of the definition of a wheel that may slide, after its other signals. */
 #define GRIP_FIELDS(type)                                                                                    \
-  { PW_AT (type, grip), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                                    \
+  { PW_AT (type, grip), PW_SIGNAL, .limit = 1, .unit = "N",                                                  \
     .about = "largest lateral force, beyond which the wheel slides; 0: no limit" },                          \
   {                                                                                                          \
-    PW_AT (type, grip_sliding), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                            \
+    PW_AT (type, grip_sliding), PW_SIGNAL, .limit = 1, .unit = "N",                                          \
                                            .about = "lateral force while it slides; 0: as large as the grip" \
   }
 

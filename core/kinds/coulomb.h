@@ -4,7 +4,7 @@
  *   F = c v + L tanh (v / v0),  dF/dv = c + (L / v0) (1 - tanh^2 (v / v0)),  loss = F v >= 0
  *
  * (Andersson, Soderberg & Bjorklund 2007, Tribology International 40, 580-587, for the smoothing by tanh.)
- * The limit L (friction coefficient times normal load) is constant, since forces cannot depend on multipliers.  The
+ * The limit L (friction coefficient times normal load) is constant here, that of exact friction a signal.  The
  * smoothed law cannot stick: under an applied force or torque P < L it creeps, for c = 0 at v0 atanh (P / L).
  *
  * Exact friction is the constraint equation v = 0, whose multiplier lambda is between -L and L.  Beyond them it slides:
@@ -28,7 +28,19 @@ static inline int coulomb_make (double viscous, double limit, double speed, coul
   return PW_OK;
 }
 
-static inline int coulomb_make_exact (double viscous, double limit, double sliding, coulomb *law, pw_error *error) {
+/* The same of a definition, whose limits are signals. */
+static inline int coulomb_make_smooth (double viscous, const pw_signal *limit, const pw_signal *sliding, double speed,
+                                       coulomb *law, pw_error *error) {
+  if (limit->type != PW_CONSTANT)
+    return pw_fail (error, PW_INPUT, "limit: a signal: expected a number, unless friction is exact: no speed");
+  if (limit_given (sliding))
+    return pw_fail (error, PW_INPUT, "limit_sliding: expected 0, unless friction is exact: a limit, no speed");
+  if (limit->constant < 0) return limit_check ("limit", limit, sliding, error);
+  return coulomb_make (viscous, limit->constant, speed, law, error);
+}
+
+static inline int coulomb_make_exact (double viscous, const pw_signal *limit, const pw_signal *sliding, coulomb *law,
+                                      pw_error *error) {
   *law = (coulomb){ .viscous = viscous };
   return limit_check ("limit", limit, sliding, error);
 }
@@ -54,11 +66,11 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
 #define EXACT_COULOMB(type, definition_type)                                \
   static int type##_is_exact (const void *definition) {                     \
     const definition_type *x = definition;                                  \
-    return x->limit > 0 && x->speed == 0;                                   \
+    return limit_given (&x->limit) && x->speed == 0;                        \
   }                                                                         \
   static void type##_limits (const void *definition, pw_bounds *limit) {    \
     const definition_type *x = definition;                                  \
-    limit_both_sides (x->limit, x->limit_sliding, limit);                   \
+    limit_both_sides (&x->limit, &x->limit_sliding, limit);                 \
     limit->initially_slides = 1;                                            \
   }                                                                         \
   PER_ELEMENT (type##_exact_J, type, 6) {                                   \

@@ -42,7 +42,9 @@ static int scene_choice (pw_random *r, const pw_field *f) {
 static void scene_value (pw_random *r, const pw_field *f, void *at) {
   int is_default = f->type == PW_NUMBER && f->domain == PW_REAL && !f->required && pw_random_between (r, 0, 1) < 0.2;
   if (f->type == PW_NUMBER) *(double *)at = is_default ? 0 : scene_number (r, f->domain);
-  if (f->type == PW_SIGNAL) *(pw_signal *)at = scene_signal (r);
+  if (f->type == PW_SIGNAL && !f->limit) *(pw_signal *)at = scene_signal (r);
+  if (f->limit && !f[-1].limit)
+    ((pw_signal *)at)->constant = scene_number (r, PW_NONNEGATIVE); /* that while sliding: 0 */
   if (f->type == PW_CHOICE) *(int *)at = scene_choice (r, f);
   for (int i = 0; i < 2 && f->type == PW_POINT; i++) ((double *)at)[i] = pw_random_between (r, -0.6, 0.6);
   for (int i = 0; i < 2 && f->type == PW_VECTOR; i++) ((double *)at)[i] = scene_number (r, PW_REAL);

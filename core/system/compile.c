@@ -109,9 +109,20 @@ static int compile_types (compilation *job) {
   return PW_OK;
 }
 
+/* The next limit of an element that varies, from field *f on; NULL: there is none. */
+static const pw_signal *compile_limit (const pw_element *e, const pw_field **f) {
+  for (; (*f)->name; ++*f) {
+    const pw_signal *signal = (const void *)((const char *)e->definition + (*f)->offset);
+    if ((*f)->limit && signal->type != PW_CONSTANT) return signal;
+  }
+  return NULL;
+}
+
 static int compile_sizes (const compilation *job) {
   const pw_model *m = job->m;
   pw_system *s = job->s;
+  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
+    for (const pw_field *f = e->kind->fields; compile_limit (e, &f); f++) s->sources++, s->limit_sources++;
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
   if (m->bodies > COMPILE_MOST / 3) return compile_too_large (job);
   s->bodies = m->bodies;
@@ -238,7 +249,7 @@ static int compile_element (const compilation *job, const pw_element_batch *k, i
 }
 
 static int compile_batches (const compilation *job) {
-  pw_source *source = job->s->source;
+  pw_source *source = job->s->source + job->s->limit_sources;
   const compiled *from = job->list;
   int status = PW_OK;
   for (pw_element_batch *k = job->s->batch; k < job->s->batch + job->s->batches && status == PW_OK; k++) {
@@ -326,11 +337,30 @@ static int compile_signal (const compilation *job, pw_source *source, const pw_s
   return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
 }
 
+/* The signals of limits, and their elements and fields. */
+static int compile_limit_signals (const compilation *job) {
+  pw_system *s = job->s;
+  const compiled *from = job->list;
+  const pw_signal *signal;
+  int count = 0;
+  s->limit_signal = compile_alloc (job, (size_t)s->limit_sources, sizeof *s->limit_signal);
+  if (s->limit_signal == NULL) return PW_RESOURCE;
+  for (int i = 0; i < s->batches; i++)
+    for (int e = 0; e < s->batch[i].b.count; e++, from++)
+      for (const pw_field *f = s->batch[i].kind->fields; (signal = compile_limit (from->element, &f)) != NULL; f++) {
+        s->limit_signal[count] = (pw_limit_signal){ i, e, f };
+        s->source[count].of_force = 1;
+        const int status = compile_signal (job, &s->source[count++], signal, s->batch[i].name[e]);
+        if (status != PW_OK) return status;
+      }
+  return PW_OK;
+}
+
 /* After all elements are stored, because signals may read their internal coordinates. */
 static int compile_signals (const compilation *job) {
   pw_system *s = job->s;
   const compiled *from = job->list;
-  pw_source *source = s->source;
+  pw_source *source = s->source + s->limit_sources;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
     for (int e = 0; e < k->b.count; e++, from++)
       for (int u = 0; u < k->kind->signals; u++, source++) {
@@ -432,16 +462,38 @@ static int compile_has_work (const pw_element_batch *k, int element) {
   return kind->level != PW_HOLONOMIC || constants < kind->signals;
 }
 
+/* The signal of a limit of an element, in its definition; -1: it has none. */
+static int compile_find_limit (const pw_system *s, int batch, int element, const void *definition,
+                               const pw_signal *signal) {
+  for (int i = 0; signal && i < s->limit_sources; i++) {
+    const pw_limit_signal *x = &s->limit_signal[i];
+    if (x->batch == batch && x->element == element &&
+        (const char *)definition + x->field->offset == (const void *)signal)
+      return i;
+  }
+  return -1;
+}
+
 /* The limits of all multipliers, if there are any. */
 static int compile_limits (const compilation *job) {
   pw_system *s = job->s;
   const compiled *from = job->list;
   pw_bounds *limit = compile_alloc (job, (size_t)s->rows, sizeof *limit);
-  if (limit == NULL) return PW_RESOURCE;
-  for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, 0, 0 };
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++)
-    for (int e = 0; e < k->b.count; e++, from++)
-      if (k->kind->limits) k->kind->limits (from->element->definition, limit + k->row + e * k->kind->rows);
+  s->limit_source = compile_alloc (job, (size_t)s->rows, sizeof *s->limit_source);
+  if (limit == NULL || s->limit_source == NULL) return PW_RESOURCE;
+  for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, .circle = 0 };
+  for (int b = 0; b < s->constraints; b++)
+    for (int e = 0; e < s->batch[b].b.count; e++, from++) {
+      const pw_kind *kind = s->batch[b].kind;
+      const void *definition = from->element->definition;
+      const int first = s->batch[b].row + e * kind->rows;
+      if (kind->limits) kind->limits (definition, limit + first);
+      for (int i = first; i < first + kind->rows; i++)
+        for (int n = 0; n < 2; n++) {
+          s->limit_source[i][n] = compile_find_limit (s, b, e, definition, limit[i].signal[n]);
+          limit[i].signal[n] = NULL;
+        }
+    }
   s->limit = limit;
   for (int i = 0; i < s->rows; i++) {
     s->limited += pw_is_limited (s, i);
@@ -545,6 +597,7 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_sizes (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);
+  if (status == PW_OK) status = compile_limit_signals (job);
   if (status == PW_OK) status = compile_signals (job);
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;

@@ -69,13 +69,17 @@ static const char *fault_field (const pw_kind *kind, const pw_field *f) {
 
 /* The fault of the fields, or ""; the text may be in the buffer. */
 static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size) {
-  int bodies = 0, signals = 0;
+  int bodies = 0, signals = 0, limits = 0;
   if (kind->fields == NULL) return "no table of fields";
   for (const pw_field *f = kind->fields; f->name; f++) {
     const char *fault = fault_field (kind, f);
     if (*fault) return pw_print (buffer, size, "field %.50s: %s", f->name, fault);
     if (f->type == PW_BODY) bodies += pw_field_count (f);
-    if (f->type == PW_SIGNAL) signals += pw_field_count (f);
+    if (f->limit && (f->type != PW_SIGNAL || f->count > 1))
+      return pw_print (buffer, size, "field %.50s: a limit that is not one signal", f->name);
+    if (f->type == PW_SIGNAL && !f->limit && limits) return "signals after those of limits";
+    if (f->type == PW_SIGNAL && !f->limit) signals += pw_field_count (f);
+    limits |= f->limit;
   }
   if (kind->each_body && (bodies > 0 || kind->bodies != 1))
     return "an element type that acts on each body has one body and no body fields";
@@ -247,7 +251,7 @@ static void check_value (const pw_kind *kind, const pw_field *f, const void *at,
     const char *expected = pw_domain_check (f->type == PW_NUMBER ? f->domain : PW_REAL, value);
     if (*expected) snprintf (text, size, " = %g: expected %s", value, expected);
   }
-  if (f->type == PW_SIGNAL) pw_signal_check (at, kind, &point, text, size);
+  if (f->type == PW_SIGNAL) pw_signal_check (at, f->limit ? NULL : kind, &point, text, size);
   if (f->type == PW_TEXT && *(const char *const *)at && is_bad_text (*(const char *const *)at))
     snprintf (text, size, FAULT_TEXT);
   if (f->type != PW_CHOICE) return;
@@ -480,7 +484,8 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
     *body = model_copy_text (m, *body);
   }
   for (int i = 0; (text = pw_field_mutable (kind, copy, PW_TEXT, i)) != NULL; i++) *text = model_copy_text (m, *text);
-  for (int i = 0; i < kind->signals; i++) model_copy_signal (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
+  pw_signal *signal;
+  for (int i = 0; (signal = pw_field_mutable (kind, copy, PW_SIGNAL, i)) != NULL; i++) model_copy_signal (m, signal);
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;
 }

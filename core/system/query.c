@@ -177,6 +177,11 @@ char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size
 
 static const pw_element_batch *query_signal (const pw_system *s, int signal, int *element, const pw_field **field,
                                              int *index) {
+  if (signal < s->limit_sources) {
+    *element = s->limit_signal[signal].element, *field = s->limit_signal[signal].field, *index = 0;
+    return &s->batch[s->limit_signal[signal].batch];
+  }
+  signal -= s->limit_sources;
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, signals), signal, element, index);
   const pw_field *f = k->kind->fields;
   for (; f->type != PW_SIGNAL || *index >= pw_field_count (f); f++)
@@ -375,7 +380,10 @@ const pw_bounds *pw_system_limits (const pw_system *s, int row) {
 const char *pw_system_mode_name (const pw_system *s, int row, int mode) {
   const pw_bounds *limit = s->limit ? &s->limit[row] : NULL;
   if (mode == 0) return "holds";
-  return limit && pw_is_one_sided (limit) ? "free" : mode > 0 ? "slides+" : "slides-";
+  return limit && limit->circle             ? "slides"
+         : limit && pw_is_one_sided (limit) ? "free"
+         : mode > 0                         ? "slides+"
+                                            : "slides-";
 }
 
 /* "torque T: value" */

@@ -45,6 +45,12 @@ typedef struct {
   enum { PW_WORK, PW_LOSS } type;
 } pw_entry;
 
+/* A limit that varies: its element and field. */
+typedef struct {
+  int batch, element;
+  const pw_field *field;
+} pw_limit_signal;
+
 /* An output of the model. */
 typedef struct {
   const char *name, *unit;
@@ -59,23 +65,26 @@ struct pw_system {
   pw_arena arena; /* contains all arrays but `batch` */
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
-  int mechanical;          /* coordinates but those of first-order states (state.c), which are the last ones */
-  int constraints;         /* batches with constraint equations */
-  int forces, first_force; /* batches with a force that is not constant; the first one */
-  int saturates;           /* 1: some of these have a function `saturation` */
-  int sources;             /* signals */
-  int state_dependent;     /* signals that depend on states or on an internal coordinate */
-  int feedback;            /* those of them that belong to velocity constraints */
-  int reads;               /* number of states that they read, with repetitions */
-  size_t jacobian;         /* entries of J of all elements, zeros included */
-  size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
-  int powers;              /* entries of the ledger but those of impacts */
-  int rheonomic;           /* batches whose eta may be other than 0 */
-  int limited;             /* constraint equations whose multipliers have limits */
-  pw_bounds *limit;        /* rows, if there are any; else NULL */
-  pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
-  const char **body_name;  /* bodies */
-  double *M;               /* coords: diagonal of M; 0 of first-order states, which have no kinetic energy */
+  int mechanical;                /* coordinates but those of first-order states (state.c), which are the last ones */
+  int constraints;               /* batches with constraint equations */
+  int forces, first_force;       /* batches with a force that is not constant; the first one */
+  int saturates;                 /* 1: some of these have a function `saturation` */
+  int sources;                   /* signals */
+  int limit_sources;             /* those of limits that vary, the first ones */
+  int state_dependent;           /* signals that depend on states or on an internal coordinate */
+  int feedback;                  /* those of them that belong to velocity constraints */
+  int reads;                     /* number of states that they read, with repetitions */
+  size_t jacobian;               /* entries of J of all elements, zeros included */
+  size_t block;                  /* the largest count x cols of a batch; twice that if its force saturates */
+  int powers;                    /* entries of the ledger but those of impacts */
+  int rheonomic;                 /* batches whose eta may be other than 0 */
+  int limited;                   /* constraint equations whose multipliers have limits */
+  pw_bounds *limit;              /* rows, if there are any; else NULL */
+  int (*limit_source)[2];        /* rows: the signals pw_bounds.signal, -1: none */
+  pw_limit_signal *limit_signal; /* limit_sources */
+  pw_scale scale;                /* with T = 1 s; T of a run is in its workspace */
+  const char **body_name;        /* bodies */
+  double *M;                     /* coords: diagonal of M; 0 of first-order states, which have no kinetic energy */
   double *mass;            /* coords: the same, but the mean where nothing turns a body (pw_is_unturned); 1 of states */
   const char **state_unit; /* 2 (coords - mechanical): of each first-order state and of its rate */
   int *angle_user;         /* bodies: of one without inertia the first element that depends on its angle; -1: none */
@@ -84,7 +93,7 @@ struct pw_system {
   double *q0, *v0;         /* coords: the described initial state, or values of pw_model_set_initial */
   unsigned char *origin;   /* 2 coords: origin of initial values: PW_GIVEN | ... */
   pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
-  pw_source *source;       /* sources, ordered by batch */
+  pw_source *source;       /* sources: those of limits, then those of elements, ordered by batch */
   pw_entry *entry;         /* entries; losses by impacts alone are the last ones */
   pw_compiled_output *output; /* outputs */
   int outputs;

@@ -509,6 +509,8 @@ static void modes_input (pw_linearisation *x, const pw_element_batch *k, int e, 
 static void modes_inputs (pw_linearisation *x, double *B) {
   pw_workspace *w = x->r->w;
   int inputs = x->r->s->sources;
+  for (int i = 0; i < x->r->s->limit_sources; i++, B++) /* none is reached, or there is no linearisation */
+    for (int c = 0; c < x->size; c++) B[c * inputs] = 0;
   for (pw_element_batch *k = w->batch; k < w->batch + x->r->s->batches; k++) {
     if (k->kind->signals == 0) continue;
     if (k->kind->force_u) k->kind->force_u (&k->b, x->tangent.block);

@@ -158,6 +158,56 @@ void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v) {
   }
 }
 
+/* Adds value times row i of J of a batch, transposed, to a column. */
+static void given_add (pw_tangent *x, const pw_element_batch *k, int i, int row, int col, double value) {
+  for (int c = 0; c < k->b.cols; c++) {
+    const int j = pw_global (k, i / k->kind->rows, c);
+    if (j < x->run->s->coords)
+      pw_scatter_add (&x->scatter, row + j, col, x->scatter.recording ? 0 : k->J[i * k->b.cols + c] * value);
+  }
+}
+
+/* Evaluates (J v)_q of a batch into the block, and stores v in the direction. */
+static void given_velocities (pw_tangent *x, pw_element_batch *k) {
+  double *to = x->direction;
+  for (int e = 0; e < k->b.count; e++) {
+    for (int n = 0; n < k->kind->bodies; n++) {
+      const pw_configuration *p = k->b.configuration + k->b.body[e * k->kind->bodies + n];
+      *to++ = p->vx, *to++ = p->vy, *to++ = p->omega;
+    }
+    for (int n = 0; n < k->kind->internal; n++) *to++ = k->b.v[e * k->kind->internal + n];
+  }
+  k->b.w = x->direction;
+  if (!x->scatter.recording) pw_evaluate_block (x->run->w, k, PW_JW_Q, x->block);
+}
+
+/* Adds J^T d lambda/d(q, v) of the equations whose given multipliers depend on states. */
+static void tangent_add_given (pw_tangent *x, int row, int col_q, int col_v) {
+  const pw_run *r = x->run;
+  const int n = r->s->coords;
+  for (pw_element_batch *k = r->w->batch; k < r->w->batch + r->s->constraints; k++) {
+    if (k->kind->limits) given_velocities (x, k);
+    for (int i = 0; i < k->b.count * k->kind->rows && k->kind->limits; i++) {
+      const pw_given by = r->given[k->row + i];
+      if (!by.is_given) continue;
+      for (int m = 0; m < 2; m++) {
+        const pw_source *source = by.source[m] < 0 ? NULL : r->w->source + by.source[m];
+        for (int read = 0; source && read < source->reads; read++) {
+          const int j = source->state[read];
+          given_add (x, k, i, row, j < n ? col_q + j : col_v + j - n,
+                     by.by_source[m] * source->x[source->reads + read]);
+        }
+        for (int c = 0; by.first >= 0 && c < k->b.cols; c++) {
+          const int j = pw_global (k, i / k->kind->rows, c), at = (by.first - k->row + m) * k->b.cols + c;
+          if (j >= n) continue;
+          given_add (x, k, i, row, col_v + j, by.by_u[m] * k->J[at]);
+          given_add (x, k, i, row, col_q + j, by.by_u[m] * x->block[at]);
+        }
+      }
+    }
+  }
+}
+
 /* Adds `coefficient` times the gradient of a signal to a row. */
 static void feedback_add_gradient (pw_tangent *x, const pw_source *source, double coefficient, int row,
                                    const pw_feedback *put) {
@@ -252,6 +302,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   put.col = to->v;
   pw_tangent_add_block (x, PW_FORCE_V, &put);
   pw_tangent_add_signals (x, to->momentum, to->q, to->v);
+  if (x->run->update_given) tangent_add_given (x, to->momentum, to->q, to->v);
   for (int j = 0; j < s->coords; j++)
     pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->a_factor * s->mass[j]);
   pw_tangent_add_feedback (x, &(pw_feedback){ to->momentum, to->q, to->v, 1, 1, .lambda = lambda });
@@ -326,7 +377,7 @@ static void dae_constraints (pw_dae *x, const double *v, const double *a, double
 }
 
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F) {
-  const pw_run *r = x->tangent.run;
+  pw_run *r = x->tangent.run;
   int n = x->n;
   dae_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
   for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];

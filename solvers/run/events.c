@@ -61,7 +61,8 @@ typedef struct pw_events {
   double longest, roughness; /* next adaptive step [s]; the bend of multipliers in the last one over EVENTS_BEND */
   double *memory;            /* of pw_first_crossing */
   double *u, *u_before, *impulse;
-  const unsigned char *origin; /* of initial values: of the run; NULL in a restart */
+  const unsigned char *origin;      /* of initial values: of the run; NULL in a restart */
+  double *direction, *bias, *reach; /* d, e and e0 of circles */
   double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
   int at_end;     /* 1: the state reached, its multipliers and its J are known */
   int samples;    /* 1: J has been evaluated elsewhere since */
@@ -74,6 +75,7 @@ typedef struct pw_events {
   /* Of a decision: the equations D, by their number among those with limits. */
   int n, *list;
   double *A, *b, *x, *lo, *hi, *factor; /* n x n; n; factor: n (n + 1) */
+  double *towards;                      /* n: of circles at their limit, the direction of x */
   int *held;                            /* n: those that hold */
   signed char *trial;                   /* n: modes */
   double *f, *a, *gamma, *lambda;       /* coords + 3; the same; rows; 2 rows */
@@ -84,8 +86,9 @@ static int events_allocate (pw_run *r) {
   const size_t n = (size_t)s->limited, rows = (size_t)s->rows, coords = (size_t)s->coords + 3;
   pw_events *x = r->events = pw_arena_alloc (&r->arena, sizeof *x);
   if (x == NULL) return PW_RESOURCE;
-  double **const number[] = { &x->force_unit, &x->unit, &x->u,  &x->u_before, &x->impulse, &x->offset,
-                              &x->b,          &x->x,    &x->lo, &x->hi,       &x->mean };
+  double **const number[] = { &x->force_unit, &x->unit, &x->u,     &x->u_before, &x->impulse,
+                              &x->offset,     &x->b,    &x->x,     &x->lo,       &x->hi,
+                              &x->direction,  &x->bias, &x->reach, &x->towards,  &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
   signed char **const mode[] = { &x->mode, &x->before, &x->trial };
   unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked };
@@ -108,42 +111,50 @@ static int events_allocate (pw_run *r) {
     x->lambda = pw_layout_alloc (&l, 2 * rows, sizeof *x->lambda);
     x->memory = pw_layout_alloc (&l, 2 * n * (PW_CROSSING_DEPTH + 2), sizeof *x->memory);
     r->reaction = pw_layout_alloc (&l, rows, sizeof *r->reaction);
+    r->given = pw_layout_alloc (&l, rows, sizeof *r->given);
   }
   return r->events_memory ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Modes of the run ---- */
 
-/* The multiplier of an equation at a limit. */
+/* The multiplier of an equation at a limit; on a circle, at the beginning of the step. */
 static double events_given (const pw_events *x, int i) {
+  if (x->limit[i].circle) return x->limit[i].sliding[1] * x->direction[i];
   return x->limit[i].sliding[x->mode[i] > 0];
+}
+
+/* Value of signal n (0, 1: while it holds, while it does not) of the limits of equation i, at least 0; else `other`. */
+static double events_magnitude (const pw_run *r, int i, int n, double other) {
+  const int source = r->s->limit_source[r->events->row[i]][n];
+  return source < 0 ? other : fmax (0, r->w->u[3 * source]);
+}
+
+/* Sets the limits that vary, where kinematics are up to date. */
+static void events_limits (pw_run *r) {
+  pw_events *x = r->events;
+  for (int i = 0; i < x->count && r->s->limit_sources > 0; i++) {
+    pw_bounds *limit = &x->limit[i];
+    if (pw_is_one_sided (limit)) continue;
+    limit->most = events_magnitude (r, i, 0, limit->most), limit->least = -limit->most;
+    limit->sliding[1] = fmin (limit->most, events_magnitude (r, i, 1, r->s->limit[x->row[i]].sliding[1]));
+    limit->sliding[0] = -limit->sliding[1];
+  }
 }
 
 /* The mode of an equation that does not hold: of one with two finite limits by the sign of u. */
 static signed char events_off (const pw_events *x, int i, double u) {
-  if (isinf (x->limit[i].least)) return 1;
+  if (isinf (x->limit[i].least) || x->limit[i].circle) return 1;
   return isinf (x->limit[i].most) || u < 0 ? -1 : 1;
 }
 
-/* Makes the modes those of the run. */
-static void events_apply (pw_run *r) {
-  pw_events *x = r->events;
-  int off = 0;
-  for (int i = 0; i < r->s->rows; i++) {
-    const pw_bounds *limit = &r->s->limit[i];
-    x->enforced[i] = pw_can_hold (limit);
-    r->reaction[i] = 0;
-    off |= !x->enforced[i];
-  }
-  for (int i = 0; i < x->count; i++) {
-    if (x->mode[i] == 0 && !x->stepping) continue;
-    x->enforced[x->row[i]] = 0;
-    r->reaction[x->row[i]] = -(x->stepping ? x->mean[i] : events_given (x, i));
-    off = 1;
-  }
-  r->active = r->enforced = off ? x->enforced : NULL;
-  r->redundant_drive = off;
-  r->forces = off ? PW_FORCES_AT_LIMITS : r->s->forces > 0;
+/* An equation slides, or both of a circle, of which i is the first, with these u. */
+static void events_slide (pw_events *x, int i, const double *u) {
+  x->mode[i] = events_off (x, i, u[i]);
+  if (x->limit[i].circle == 0) return;
+  const double size = hypot (u[i], u[i + 1]);
+  x->mode[i + 1] = 1, x->bias[i] = x->bias[i + 1] = 0;
+  for (int k = i; k < i + 2; k++) x->direction[k] = size > 0 ? u[k] / size : k == i;
 }
 
 /* u of the equations with limits at velocities v, where J is evaluated; of holonomic equations their rate, unless g is
@@ -158,6 +169,122 @@ static void events_u (pw_run *r, const double *v, int g, double *u) {
   for (int i = 0; i < x->count; i++) u[i] = Jv[x->row[i]];
 }
 
+/* ---- Sliding on a circle: two equations with a limit of the resultant of their multipliers ----
+ *
+ * Both multipliers are given, lambda = L n with n = u / |u|.  Near u = 0 the direction of u is stiff: it relaxes at the
+ * rate A L / |u|, which no explicit method could follow where sliding begins or ends.  There
+ *
+ *   n = (u + e d) / |u + e d|,   d: n at the beginning of the step,   e = e0 (1 - |u| / (4 e0)) for |u| < 4 e0, else 0
+ *
+ * has a rate of at most A L / e0.  e and d are constant in a step; since d follows n, the error is that of the turn of
+ * n in one step while |u| < 4 e0: methods are of order 2 there, and exact where n does not turn.  e0: A L h with fixed
+ * steps h, otherwise sqrt (rtol) in units of u.  Beyond the line through 0 across d, n is mirrored at it, so that it
+ * is continuous where u passes 0 within a step. */
+
+/* J v of an equation, where J is evaluated. */
+static double circle_speed (const pw_workspace *w, int row) {
+  const pw_element_batch *k = w->batch;
+  while (row >= k->row + k->b.count * k->kind->rows) k++;
+  const int e = (row - k->row) / k->kind->rows, bodies = k->kind->bodies;
+  const double *J = k->J + (row - k->row) * k->b.cols;
+  double sum = 0;
+  for (int n = 0; n < bodies; n++, J += 3) {
+    const pw_configuration *p = k->b.configuration + k->b.body[e * bodies + n];
+    sum += J[0] * p->vx + J[1] * p->vy + J[2] * p->omega;
+  }
+  for (int n = 0; n < k->kind->internal; n++) sum += J[n] * k->b.v[e * k->kind->internal + n];
+  return sum;
+}
+
+/* n of the circle whose first equation is i, and its derivatives by u (2 x 2, row-major), where J is evaluated.
+ * Returns |u|. */
+static double circle_direction (const pw_run *r, int i, double n[2], double by_u[4]) {
+  const pw_events *x = r->events;
+  const double *d = x->direction + i, u0 = circle_speed (r->w, x->row[i]), u1 = circle_speed (r->w, x->row[i + 1]);
+  const double along = u0 * d[0] + u1 * d[1] + x->bias[i], across = u1 * d[0] - u0 * d[1], size = hypot (along, across);
+  const double a = size > 0 ? fabs (along) / size : 1, c = size > 0 ? across / size : 0, side = along < 0 ? -1 : 1;
+  const double of[4] = { side * c * c, -a * c, -side * a * c, a * a }; /* along d, across it */
+  n[0] = a * d[0] - c * d[1], n[1] = a * d[1] + c * d[0];
+  for (int m = 0; m < 4; m++) {
+    const double *R = (const double[]){ d[0], -d[1], d[1], d[0] }, *p = R + m / 2 * 2, *q = R + m % 2 * 2;
+    const double sum = p[0] * (of[0] * q[0] + of[1] * q[1]) + p[1] * (of[2] * q[0] + of[3] * q[1]);
+    by_u[m] = size > 0 ? sum / size : 0;
+  }
+  return hypot (u0, u1);
+}
+
+/* Sets e0 and, for this |u|, e.  A L: an upper bound, of the masses without other constraints. */
+static void circle_set_bias (pw_run *r, int i, double speed) {
+  pw_events *x = r->events;
+  double A = 0;
+  for (int row = x->row[i]; row < x->row[i] + 2 && r->fixed_steps; row++) {
+    memset (x->gamma, 0, (size_t)r->s->rows * sizeof *x->gamma);
+    memset (x->f, 0, ((size_t)r->s->coords + 3) * sizeof *x->f);
+    x->gamma[row] = 1;
+    pw_add_JT (r->w, x->gamma, x->f);
+    for (int j = 0; j < r->s->coords; j++)
+      if (r->s->mass[j] > 0) A += x->f[j] * x->f[j] / r->s->mass[j];
+  }
+  x->reach[i] = r->fixed_steps ? r->settings.step * A * x->limit[i].sliding[1] : sqrt (r->settings.rtol) * x->unit[i];
+  x->bias[i] = fmax (0, x->reach[i] - speed / 4);
+}
+
+/* Sets d and e of a step from the state reached. */
+static void circle_begin_step (pw_run *r) {
+  pw_events *x = r->events;
+  for (int i = 0; i < x->count; i++) {
+    double n[2], by_u[4];
+    if (x->limit[i].circle != 1 || x->mode[i] == 0) continue;
+    const double speed = circle_direction (r, i, n, by_u);
+    x->direction[i] = n[0], x->direction[i + 1] = n[1];
+    circle_set_bias (r, i, speed);
+  }
+}
+
+/* pw_run.update_given */
+static void events_update (pw_run *r) {
+  const pw_events *x = r->events;
+  double n[2], by_u[4];
+  events_limits (r);
+  for (int i = 0; i < x->count; i++) {
+    const int row = x->row[i], circle = x->limit[i].circle, *source = r->s->limit_source[row];
+    const double limit = x->limit[i].sliding[1];
+    pw_given *by = &r->given[row];
+    *by = (pw_given){ x->mode[i] != 0, { source[0], source[1] }, .first = circle ? row + 1 - circle : -1 };
+    if (x->mode[i] == 0) continue;
+    if (circle == 1) circle_direction (r, i, n, by_u);
+    const double part = circle ? n[circle - 1] : x->mode[i];
+    const int follows = source[1] >= 0 && limit < x->limit[i].most;
+    r->reaction[row] = pw_is_one_sided (&x->limit[i]) ? -events_given (x, i) : -part * limit;
+    by->by_source[follows] = limit > 0 ? part : 0;
+    for (int m = 0; m < 2 && circle; m++) by->by_u[m] = limit * by_u[2 * circle - 2 + m];
+  }
+}
+
+/* Makes the modes those of the run. */
+static void events_apply (pw_run *r) {
+  pw_events *x = r->events;
+  int off = 0;
+  events_limits (r);
+  r->update_given = NULL;
+  for (int i = 0; i < r->s->rows; i++) {
+    const pw_bounds *limit = &r->s->limit[i];
+    x->enforced[i] = pw_can_hold (limit);
+    r->reaction[i] = 0;
+    off |= !x->enforced[i];
+  }
+  for (int i = 0; i < x->count; i++) {
+    if (x->mode[i] == 0 && !x->stepping) continue;
+    x->enforced[x->row[i]] = 0;
+    r->reaction[x->row[i]] = -(x->stepping ? x->mean[i] : events_given (x, i));
+    if (!x->stepping && (r->s->limit_sources > 0 || x->limit[i].circle)) r->update_given = events_update;
+    off = 1;
+  }
+  r->active = r->enforced = off ? x->enforced : NULL;
+  r->redundant_drive = off;
+  r->forces = off ? PW_FORCES_AT_LIMITS : r->s->forces > 0;
+}
+
 /* ---- Event functions, positive beyond an event: two for each equation ---- */
 
 /* Below this u [units] is 0 after its root: the error of the method. */
@@ -170,13 +297,21 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
   pw_events *x = r->events;
   const double tolerance = events_tolerance (r);
   events_u (r, v, 1, x->u);
+  events_limits (r);
   for (int i = 0; i < x->count; i++) {
     const pw_bounds *limit = &x->limit[i];
     double y = lambda[x->row[i]];
     value[2 * i] = isinf (limit->most) ? -1 : (y - limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
     value[2 * i + 1] = isinf (limit->least) ? -1 : (limit->least - y) / x->force_unit[i] - EVENTS_ROUND_OFF;
-    if (x->mode[i] == 0) continue;
-    value[2 * i] = -x->mode[i] * x->u[i] / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
+    double u = x->mode[i] * x->u[i];
+    if (limit->circle == 1) {
+      value[2 * i] = (hypot (y, lambda[x->row[i + 1]]) - limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
+      u = x->u[i] * x->direction[i] + x->u[i + 1] * x->direction[i + 1];
+    }
+    if (limit->circle == 2) value[2 * i] = -1;
+    if (limit->circle) value[2 * i + 1] = -1;
+    if (x->mode[i] == 0 || limit->circle == 2) continue;
+    value[2 * i] = -u / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
     value[2 * i + 1] = -1;
   }
 }
@@ -259,7 +394,7 @@ static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
   } else {
     pw_evaluate_force (r->w, x->f);
     for (int k = 0; k < x->n; k++) r->reaction[x->row[x->list[k]]] = 0; /* the unknowns */
-    pw_add_given_forces (r, x->f);
+    pw_add_JT (r->w, r->reaction, x->f);
     pw_evaluate_gamma (r->w, x->gamma);
     memcpy (x->lambda, x->gamma, (size_t)s->rows * sizeof *x->lambda);
     pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
@@ -325,6 +460,7 @@ static int decision_solve (pw_events *x, int skips) {
 static double decision_violation (const pw_events *x, int k, double size, int *to) {
   const double unit = sqrt (x->A[k * x->n + k]);
   double z = x->b[k];
+  if (x->limit[x->list[k]].circle) return 0; /* decision_round */
   *to = x->x[k] > x->hi[k] ? 1 : -1;
   if (x->trial[k] == 0) return unit * fmax (x->x[k] - x->hi[k], x->lo[k] - x->x[k]);
   for (int i = 0; i < x->n; i++) z -= x->A[k * x->n + i] * x->x[i];
@@ -343,7 +479,8 @@ static int decision_pivot (pw_events *x) {
     int worst = -1, to = 0, next = 0;
     double most = 0, size = 0;
     for (int k = 0; k < n; k++)
-      if (x->trial[k]) x->x[k] = x->trial[k] > 0 ? x->hi[k] : x->lo[k];
+      if (x->trial[k])
+        x->x[k] = x->trial[k] < 0 ? x->lo[k] : x->hi[k] * (x->limit[x->list[k]].circle ? x->towards[k] : 1);
     if (decision_solve (x, 0) != PW_OK) {
       if (changed < 0 || before == 0) return PW_RETRY;
       x->trial[changed] = (signed char)before, x->blocked[changed] = 1;
@@ -361,6 +498,43 @@ static int decision_pivot (pw_events *x) {
     if (to != 0) memset (x->blocked, 0, (size_t)n);
     changed = worst, before = x->trial[worst];
     x->trial[worst] = (signed char)to;
+  }
+  return PW_RETRY;
+}
+
+/* A step towards the conditions of a circle with the equations k, k + 1 of D: x + z / trace (A) or, outside, the
+ * nearest vector within the limit; inside, the equations hold.  Returns by how much the direction changes; > 1: its
+ * mode does. */
+static double decision_round (pw_events *x, int k) {
+  double y[2], change = 0;
+  for (int m = 0; m < 2; m++) {
+    const double *row = x->A + (k + m) * x->n;
+    double z = x->b[k + m];
+    for (int i = 0; i < x->n; i++) z -= row[i] * x->x[i];
+    y[m] = x->x[k + m] + (x->trial[k] ? z / (x->A[k * x->n + k] + x->A[(k + 1) * x->n + k + 1]) : 0);
+  }
+  const double size = hypot (y[0], y[1]), most = x->hi[k] * (1 + (x->trial[k] ? -1 : 1) * 1e-13);
+  if (size <= most && (x->trial[k] == 0 || size == 0)) return 0;
+  if (size < most) return x->trial[k] = x->trial[k + 1] = 0, 2;
+  if (x->trial[k] == 0) change = 2;
+  for (int m = 0; m < 2; m++) {
+    change = fmax (change, fabs (y[m] / size - x->towards[k + m]));
+    x->towards[k + m] = y[m] / size, x->trial[k + m] = 1;
+  }
+  return change;
+}
+
+/* decision_pivot with circles: projected gradients in their multipliers (Goldstein 1964, Convex programming in Hilbert
+ * space), exact in all others. */
+static int decision_minimum (pw_events *x) {
+  double before = INFINITY;
+  for (int pass = 0; pass < 10000; pass++) {
+    double change = 0;
+    const int status = decision_pivot (x);
+    for (int k = 0; k < x->n && status == PW_OK; k++)
+      if (x->limit[x->list[k]].circle == 1) change = fmax (change, decision_round (x, k));
+    if (status != PW_OK || change == 0 || (change < 1e-12 && change >= before)) return status;
+    before = change;
   }
   return PW_RETRY;
 }
@@ -458,16 +632,20 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
   pw_events *x = r->events;
   x->n = 0;
   events_u (r, r->v, 0, x->u);
-  for (int i = 0; i < x->count; i++) {
-    const double u = x->u[i] / x->unit[i];
+  for (int i = 0, equations; i < x->count; i += equations) {
+    equations = x->limit[i].circle ? 2 : 1;
+    const double speed = equations == 2 ? hypot (x->u[i], x->u[i + 1]) : fabs (x->u[i]), u = speed / x->unit[i];
     const int open = !x->rests[i] && events_open (r, i, g[i]);
-    if (jumps && fabs (u) > EVENTS_SMALL && !open) x->mode[i] = events_off (x, i, u);
-    const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps;
-    if (open || (x->mode[i] && !rolls && fabs (u) > EVENTS_SMALL)) continue;
+    const int misses = equations == 2 && x->triggered[i] && x->mode[i] && speed > x->reach[i]; /* u passes beside 0 */
+    if (((jumps && !open) || misses) && u > EVENTS_SMALL) events_slide (x, i, x->u);
+    const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps && !misses;
+    if (open || (x->mode[i] && !rolls && u > EVENTS_SMALL)) continue;
     const double tighter = x->mode[i] == 0 && x->triggered[i] ? EVENTS_TIGHTER * x->force_unit[i] : 0;
-    x->lo[x->n] = x->limit[i].least + tighter, x->hi[x->n] = x->limit[i].most - tighter;
-    x->trial[x->n] = x->mode[i];
-    x->list[x->n++] = i;
+    for (int k = i; k < i + equations; k++) {
+      x->lo[x->n] = fmin (0, x->limit[k].least + tighter), x->hi[x->n] = fmax (0, x->limit[k].most - tighter);
+      x->trial[x->n] = x->mode[k], x->towards[x->n] = x->direction[k];
+      x->list[x->n++] = k;
+    }
   }
   events_apply (r); /* forces of those outside D */
 }
@@ -476,7 +654,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
  * multipliers exceed `known` by (NULL: 0). */
 static int decide_sliding (pw_events *x, double unit, const double *known) {
   for (int again = 1; again;) {
-    if (decision_pivot (x) != PW_OK) return PW_RETRY;
+    if (decision_minimum (x) != PW_OK) return PW_RETRY;
     again = 0;
     for (int k = 0; k < x->n; k++) {
       const int i = x->list[k];
@@ -497,6 +675,8 @@ static int decide_modes (pw_run *r, pw_error *error) {
   if (x->n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, error);
   for (int k = 0; k < x->n && status == PW_OK; k++) {
     x->mode[x->list[k]] = x->trial[k];
+    x->direction[x->list[k]] = x->towards[k];
+    if (x->limit[x->list[k]].circle == 1) circle_set_bias (r, x->list[k], 0);
     x->trial[k] = 0, x->b[k] = x->u[x->list[k]];
   }
   if (x->n > 0 && status == PW_OK) {
@@ -511,7 +691,7 @@ static int decide_modes (pw_run *r, pw_error *error) {
 static int events_log (pw_run *r) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++) {
-    if (x->mode[i] == x->before[i] && x->impulse[i] == 0) continue;
+    if ((x->mode[i] == x->before[i] && x->impulse[i] == 0) || x->limit[i].circle == 2) continue;
     if (pw_grow (&r->event, (size_t)r->event_count, &r->event_room, sizeof *r->event) != PW_OK) return PW_RESOURCE;
     r->event[r->event_count++] =
         (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], x->mode[i], x->impulse[i] != 0 };
@@ -525,6 +705,7 @@ static int events_decide (pw_run *r, int jumps, pw_error *error) {
   int impacts;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   memcpy (x->before, x->mode, (size_t)x->count);
+  events_limits (r);
   events_u (r, r->v, 1, x->now);
   int status = decide_impacts (r, x->now, &impacts, error);
   if (status != PW_OK) return status;
@@ -565,7 +746,8 @@ static int events_leave (pw_run *r, pw_error *error) {
   if (status != PW_OK) return status;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_u (r, r->v, 1, x->u);
-  for (int i = 0; i < x->count; i++) x->offset[i] = fmax (0, -x->mode[i] * x->u[i] / x->unit[i]);
+  for (int i = 0; i < x->count; i++)
+    x->offset[i] = x->limit[i].circle ? 0 : fmax (0, -x->mode[i] * x->u[i] / x->unit[i]);
   return PW_OK;
 }
 
@@ -709,6 +891,7 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
 int pw_events_advance (pw_run *r, double t_end, pw_error *error) {
   int status = events_prepare (r, error);
   const double t0 = r->t, longest = r->fixed_steps ? INFINITY : r->events->longest;
+  if (status == PW_OK) circle_begin_step (r);
   if (status == PW_OK) status = r->method->advance (r, fmin (t_end, t0 + longest), error);
   return status == PW_OK ? events_follow (r, t0, error) : status;
 }
@@ -720,12 +903,14 @@ static void events_units (pw_run *r) {
   pw_events *x = r->events;
   const double T = r->w->scale.time, L = r->s->scale.length;
   double force = 0;
+  events_limits (r);
   for (int j = 0; j < r->s->mechanical; j++)
     force = fmax (force, r->s->mass[j] * pw_unit (r->s, j) * pw_unit (r->s, j) / (L * T * T));
   for (int i = 0; i < x->count; i++) {
     const double arm = pw_rank_multiplier_unit (r->w, x->row[i]), least = x->limit[i].least, most = x->limit[i].most;
     const double largest = fmax (isinf (least) ? 0 : -least, isinf (most) ? 0 : most);
-    x->force_unit[i] = largest > 0 ? largest : force > 0 ? force * arm : 1;
+    const double scale = force > 0 ? force * arm : 1;
+    x->force_unit[i] = r->s->limit_source[x->row[i]][0] >= 0 ? fmax (largest, scale) : largest > 0 ? largest : scale;
     x->unit[i] = L / arm / ((x->row[i] < r->s->holonomic) ? 1 : T);
   }
 }
@@ -783,18 +968,20 @@ static int events_initial_friction (pw_run *r, pw_error *error) {
 static int events_initial_sliding (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++)
-    if (x->mode[i] == 0 && !(x->row[i] < r->s->holonomic)) x->mode[i] = 1;
+    if (x->mode[i] == 0 && !(x->row[i] < r->s->holonomic)) x->mode[i] = 1, x->direction[i] = 0;
   int status = events_consistent (r, error);
   if (status != PW_OK) return status;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
     pw_error own = { 0 };
-    if (pw_is_one_sided (&x->limit[i]) || x->limit[i].initially_slides) continue;
+    const int circle = x->limit[i].circle;
+    if (pw_is_one_sided (&x->limit[i]) || x->limit[i].initially_slides || circle == 2) continue;
     x->mode[i] = 0;
-    status = events_slides (x, i) ? events_consistent (r, &own) : PW_OK;
+    if (circle) x->mode[i + 1] = 0;
+    status = events_slides (x, i) || (circle && events_slides (x, i + 1)) ? events_consistent (r, &own) : PW_OK;
     if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-    if (status != PW_OK || events_moved (r)) x->mode[i] = events_off (x, i, x->u_before[i]);
+    if (status != PW_OK || events_moved (r)) events_slide (x, i, x->u_before);
   }
   return events_consistent (r, error);
 }
@@ -884,6 +1071,10 @@ int pw_events_check_modes (pw_run *r, const double *v, const double *lambda, pw_
 int pw_impulses_open (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   if (x == NULL || x->stepping) return PW_OK;
+  for (int i = 0; i < x->count; i++)
+    if (x->limit[i].circle)
+      return pw_fail (error, PW_INPUT, "%s: the grip of %s limits a resultant: use rk4, erk8 or radau", r->method->name,
+                      PW_NAME (pw_system_row_name, r->s, x->row[i]));
   for (int i = 0; i < x->count; i++) x->mean[i] = x->mode[i] ? events_given (x, i) : r->lambda[x->row[i]];
   x->stepping = 1;
   r->event_count = 0;
@@ -910,6 +1101,7 @@ int pw_impulses_predict (pw_run *r) {
 static void impulses_list (pw_run *r, double h, const double *g) {
   pw_events *x = r->events;
   x->n = x->jumped = 0;
+  events_limits (r);
   for (int i = 0; i < x->count; i++) {
     const int side = events_off (x, i, 0), is_position = x->row[i] < r->s->holonomic;
     const double before = side * x->u_before[i] / x->unit[i];
@@ -991,6 +1183,9 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->mode, (size_t)x->count);
   pw_archive_bytes (a, x->triggered, (size_t)x->count);
   pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
+  pw_archive_bytes (a, x->direction, (size_t)x->count * sizeof *x->direction);
+  pw_archive_bytes (a, x->bias, (size_t)x->count * sizeof *x->bias);
+  pw_archive_bytes (a, x->reach, (size_t)x->count * sizeof *x->reach);
   pw_archive_bytes (a, &x->pending, sizeof x->pending);
   pw_archive_bytes (a, &x->fell, sizeof x->fell);
   pw_archive_bytes (a, x->mean, (size_t)x->count * sizeof *x->mean);

@@ -191,7 +191,8 @@ TEST (bad_set_signal) {
   description_no_signal ("ridder", "value", "model ezyroller has no element \"ridder\"; did you mean \"rider\"?");
   description_no_signal ("rider", "values",
                          "model ezyroller: torque rider has no signal \"values\"; did you mean \"value\"?");
-  description_no_signal ("A", "value", "model ezyroller: wheel A has no signal \"value\"");
+  description_no_signal ("A", "value",
+                         "model ezyroller: wheel A has no signal \"value\"; valid are grip, grip_sliding");
 }
 
 /* An element type whose field has two signals. */

@@ -37,7 +37,8 @@ TEST (built_in) {
 }
 
 /* The types that stand for others. */
-static const pw_kind *const kinds_exact[] = { &pw_kind_dry_friction, &pw_kind_dry_sliding_friction, NULL };
+static const pw_kind *const kinds_exact[] = { &pw_kind_dry_friction, &pw_kind_dry_sliding_friction,
+                                              &pw_kind_slipping_wheel, NULL };
 
 TEST (exact) {
   kinds_pass (kinds_exact);

@@ -37,9 +37,11 @@ SCENE_WITH (friction_discs, friction_list, friction_parameters) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = friction_d.I[0], .rate = { 0, 0, friction_d.w } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = friction_d.I[1] });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "a", "b" } });
-  pw_add_friction (
-      m, &(pw_friction){
-             .name = "rub", .body = { "b", "a" }, .viscous = p->viscous, .limit = p->limit, .speed = p->speed });
+  pw_add_friction (m, &(pw_friction){ .name = "rub",
+                                      .body = { "b", "a" },
+                                      .viscous = p->viscous,
+                                      .limit = { .constant = p->limit },
+                                      .speed = p->speed });
 }
 
 static void friction_rub (const char *method, double viscous, double limit, double bound, const char *reason) {
@@ -82,7 +84,7 @@ SCENE_WITH (friction_beam, friction_list, friction_parameters) {
                                                       .body = { "block", "beam" },
                                                       .heading = friction_b.psi,
                                                       .viscous = p->viscous,
-                                                      .limit = p->limit,
+                                                      .limit = { .constant = p->limit },
                                                       .speed = p->speed });
 }
 
@@ -211,7 +213,9 @@ SCENE (friction_car) {
   pw_add_pin (m, &(pw_pin){ .name = "H", .body = { "car", "trailer" }, .at = { { -0.5, 0 }, { 0.5, 0 } } });
   pw_add_wheel (m, &(pw_wheel){ .name = "W", .body = "trailer", .at = { -0.1, 0 } });
   pw_add_friction (
-      m, &(pw_friction){ .name = "hitch", .body = { "car", "trailer" }, .viscous = 0.05, .limit = 0.2, .speed = 0.3 });
+      m,
+      &(pw_friction){
+          .name = "hitch", .body = { "car", "trailer" }, .viscous = 0.05, .limit = { .constant = 0.2 }, .speed = 0.3 });
   pw_add_drag (
       m,
       &(pw_drag){
@@ -227,7 +231,7 @@ SCENE (friction_car) {
                                                       .at = { { 0.05, 0 }, { 0.05, 0.2 } },
                                                       .heading = 1.2,
                                                       .viscous = 0.3,
-                                                      .limit = 0.2,
+                                                      .limit = { .constant = 0.2 },
                                                       .speed = 0.3 });
   pw_add_rolling_resistance (
       m, &(pw_rolling_resistance){ .name = "F", .body = "car", .at = { 0.4, -0.2 }, .limit = 0.5, .speed = 0.3 });

@@ -25,7 +25,8 @@ SCENE_WITH (saturation_block, saturation_list, saturation) {
   saturation_body (m, p->v, 0);
   pw_add_slider (m, &(pw_slider){ .name = "s", .body = { "b", "ground" } });
   pw_add_sliding_friction (
-      m, &(pw_sliding_friction){ .name = "f", .body = { "b", "ground" }, .limit = 1, .speed = p->speed });
+      m,
+      &(pw_sliding_friction){ .name = "f", .body = { "b", "ground" }, .limit = { .constant = 1 }, .speed = p->speed });
 }
 
 /* A block on a table that moves at 10 m/s. */
@@ -35,13 +36,15 @@ SCENE_WITH (saturation_table, saturation_list, saturation) {
   pw_add_slider (m, &(pw_slider){ .name = "r", .body = { "table", "ground" } });
   pw_add_slider (m, &(pw_slider){ .name = "s", .body = { "b", "table" } });
   pw_add_sliding_friction (
-      m, &(pw_sliding_friction){ .name = "f", .body = { "b", "table" }, .limit = 1, .speed = p->speed });
+      m,
+      &(pw_sliding_friction){ .name = "f", .body = { "b", "table" }, .limit = { .constant = 1 }, .speed = p->speed });
 }
 
 SCENE_WITH (saturation_disc, saturation_list, saturation) {
   saturation_body (m, 0, p->v);
   pw_add_pin (m, &(pw_pin){ .name = "p", .body = { "b", "ground" } });
-  pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "b", "ground" }, .limit = 1, .speed = p->speed });
+  pw_add_friction (
+      m, &(pw_friction){ .name = "f", .body = { "b", "ground" }, .limit = { .constant = 1 }, .speed = p->speed });
 }
 
 SCENE_WITH (saturation_motor, saturation_list, saturation) {

@@ -240,7 +240,8 @@ static void make_force_of_two (make *k, int dice) {
     e->rotational_spring.stiffness = make_number (k, 1, 10), e->rotational_spring.damping = make_number (k, 0, 1),
     e->rotational_spring.angle = make_number (k, -1, 1);
   if (dice == 2)
-    e->friction.viscous = make_number (k, 0, 0.5), e->friction.limit = make_number (k, 0, 0.3), e->friction.speed = 0.1;
+    e->friction.viscous = make_number (k, 0, 0.5), e->friction.limit.constant = make_number (k, 0, 0.3),
+    e->friction.speed = 0.1;
   if (dice == 3) e->torque.value = make_signal (k, 1);
   if (dice == 4)
     e->motor.stiffness = make_number (k, 0, 5), e->motor.damping = make_number (k, 0.1, 1),

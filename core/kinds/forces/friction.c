@@ -19,14 +19,12 @@ static inline friction_state friction_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (friction_prepare, pw_friction, coulomb) {
-  if (definition->limit_sliding > 0)
-    return pw_fail (error, PW_INPUT, "limit_sliding = %g: expected 0, unless friction is exact: a limit, no speed",
-                    definition->limit_sliding);
-  return coulomb_make (definition->viscous, definition->limit, definition->speed, element, error);
+  return coulomb_make_smooth (definition->viscous, &definition->limit, &definition->limit_sliding, definition->speed,
+                              element, error);
 }
 
 PREPARE (friction_prepare_exact, pw_friction, coulomb) {
-  return coulomb_make_exact (definition->viscous, definition->limit, definition->limit_sliding, element, error);
+  return coulomb_make_exact (definition->viscous, &definition->limit, &definition->limit_sliding, element, error);
 }
 
 COULOMB (friction, 6)
@@ -36,10 +34,10 @@ static const pw_field friction_fields[] = {
   { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_friction, viscous), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
     .about = "torque per angular velocity" },
-  { PW_AT (pw_friction, limit), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE, .about = "Coulomb torque" },
   { PW_AT (pw_friction, speed), PW_NUMBER, .unit = "rad/s", .domain = PW_NONNEGATIVE,
     .about = "below about this angular velocity the Coulomb torque is smoothed; left out: it is exact, and holds" },
-  { PW_AT (pw_friction, limit_sliding), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE,
+  { PW_AT (pw_friction, limit), PW_SIGNAL, .limit = 1, .unit = "N m", .about = "Coulomb torque" },
+  { PW_AT (pw_friction, limit_sliding), PW_SIGNAL, .limit = 1, .unit = "N m",
     .about = "exact Coulomb torque while sliding, at most the limit; 0: the limit" },
   { .name = NULL },
 };

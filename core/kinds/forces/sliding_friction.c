@@ -33,16 +33,14 @@ static inline sliding_state sliding_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (sliding_prepare, pw_sliding_friction, sliding) {
-  if (definition->limit_sliding > 0)
-    return pw_fail (error, PW_INPUT, "limit_sliding = %g: expected 0, unless friction is exact: a limit, no speed",
-                    definition->limit_sliding);
   element->across = line_make (definition->at, definition->heading - PW_PI / 2);
-  return coulomb_make (definition->viscous, definition->limit, definition->speed, &element->law, error);
+  return coulomb_make_smooth (definition->viscous, &definition->limit, &definition->limit_sliding, definition->speed,
+                              &element->law, error);
 }
 
 PREPARE (sliding_prepare_exact, pw_sliding_friction, sliding) {
   element->across = line_make (definition->at, definition->heading - PW_PI / 2);
-  return coulomb_make_exact (definition->viscous, definition->limit, definition->limit_sliding, &element->law, error);
+  return coulomb_make_exact (definition->viscous, &definition->limit, &definition->limit_sliding, &element->law, error);
 }
 
 PER_ELEMENT (sliding_force_q, sliding, 36) {
@@ -69,10 +67,10 @@ static const pw_field sliding_fields[] = {
   LINE_FIELDS (pw_sliding_friction),
   { PW_AT (pw_sliding_friction, viscous), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE,
     .about = "force per speed" },
-  { PW_AT (pw_sliding_friction, limit), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE, .about = "Coulomb force" },
   { PW_AT (pw_sliding_friction, speed), PW_NUMBER, .unit = "m/s", .domain = PW_NONNEGATIVE,
     .about = "below about this speed the Coulomb force is smoothed; left out: it is exact, and holds" },
-  { PW_AT (pw_sliding_friction, limit_sliding), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,
+  { PW_AT (pw_sliding_friction, limit), PW_SIGNAL, .limit = 1, .unit = "N", .about = "Coulomb force" },
+  { PW_AT (pw_sliding_friction, limit_sliding), PW_SIGNAL, .limit = 1, .unit = "N",
     .about = "exact Coulomb force while sliding, at most the limit; 0: the limit" },
   { .name = NULL },
 };

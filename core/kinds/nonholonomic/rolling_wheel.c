@@ -6,6 +6,9 @@
  *   gamma = ( omega (c vx + s vy),  omega (s vx - c vy) )         so that S v' = gamma; both rows as in contact.h
  *   f     = u on chi, power = u chi'                              u: torque about the axle
  *
+ * With a grip L, |(lambda(1), lambda(2))| <= L, beyond which both have given values, with the direction of sliding.  A
+ * brake is the equation chi' = 0, whose multiplier is limited as that of friction; it never holds without a brake.
+ *
  * The forces -lambda(1) along n and -lambda(2) along e act on the body at P.  The reaction to u and the gyroscopic
  * moments of the wheel are moments about horizontal axes, which do not enter the equations of planar motion. */
 #include "contact.h"
@@ -34,13 +37,22 @@ static double rolling_spin_rate (const rolling *element, const pw_body *body) {
          element->radius;
 }
 
+static int rolling_slips (const void *definition) {
+  const pw_rolling_wheel *x = definition;
+  return limit_given (&x->grip) || limit_given (&x->grip_sliding) || limit_given (&x->brake);
+}
+
 PREPARE (rolling_prepare, pw_rolling_wheel, rolling) {
   *element = (rolling){ contact_across (definition->at, definition->heading),
                         contact_along (definition->at, definition->heading), definition->radius };
   internal[0] =
       (pw_internal){ definition->inertia, definition->start, definition->rate, INITIAL_SPECIFIED (definition) };
   if (!internal->specified[1]) internal->rate = rolling_spin_rate (element, bodies[0]);
-  return PW_OK;
+  if (rolling_slips (definition) && !(definition->inertia > 0))
+    return pw_fail (error, PW_INPUT,
+                    "inertia = 0: expected > 0 with a grip or brake, which let the wheel turn by itself");
+  if (limit_check ("brake", &definition->brake, &definition->brake, error) != PW_OK) return error->status;
+  return limit_check ("grip", &definition->grip, &definition->grip_sliding, error);
 }
 
 PER_ELEMENT (rolling_J, rolling, 8) {
@@ -62,6 +74,39 @@ PER_ELEMENT (rolling_gamma, rolling, 2) {
     out[3] = out[7] = 0;                         \
   }
 EACH_DERIVATIVE (ROLLING_DERIVATIVE)
+
+/* The same of a wheel with a grip or brake: a third row. */
+#define SLIPPING(function, cols, ...)                     \
+  PER_ELEMENT (slipping_##function, rolling, 3 * cols) {  \
+    rolling_##function##_one (now, out);                  \
+    for (int c = 2 * cols; c < 3 * cols; c++) out[c] = 0; \
+    __VA_ARGS__                                           \
+  }
+SLIPPING (J, 4, out[11] = 1;)
+SLIPPING (gamma, 1, )
+SLIPPING (jw_q, 4, )
+SLIPPING (gamma_q, 4, )
+SLIPPING (gamma_v, 4, )
+
+static void slipping_limits (const void *definition, pw_bounds *limit) {
+  const pw_rolling_wheel *x = definition;
+  for (int i = 0; i < 2; i++) {
+    limit_both_sides (&x->grip, &x->grip_sliding, limit + i);
+    limit[i].circle = limit_given (&x->grip) ? i + 1 : 0;
+  }
+  limit[2].least = limit[2].most = 0;
+  limit_both_sides (&x->brake, &x->brake, limit + 2);
+  limit[2].initially_slides = 1;
+}
+
+static void slipping_loss (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) {
+    const rolling_state now = rolling_at (batch, e);
+    const double *lambda = batch->lambda + 3 * e, spin = batch->v[e];
+    out[e] = lambda[0] * contact_speed (&now.across) + lambda[1] * (contact_speed (&now.along) - now.radius * spin) +
+             lambda[2] * spin;
+  }
+}
 
 static void rolling_force (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = batch->u[3 * e];
@@ -92,22 +137,32 @@ static const pw_field rolling_fields[] = {
     .about = "initial spin velocity; left out: the wheel rolls at the body's initial velocity" },
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
     .about = "torque on the wheel about its axle; positive: drives along the heading" },
+  { PW_AT (pw_rolling_wheel, grip), PW_SIGNAL, .limit = 1, .unit = "N",
+    .about =
+        "largest force of the ground, lateral and longitudinal together, beyond which the wheel slides; 0: no limit" },
+  { PW_AT (pw_rolling_wheel, grip_sliding), PW_SIGNAL, .limit = 1, .unit = "N",
+    .about = "this force while it slides; 0: as large as the grip" },
+  { PW_AT (pw_rolling_wheel, brake), PW_SIGNAL, .limit = 1, .unit = "N m",
+    .about = "largest torque of a brake, which opposes the spin and holds the wheel" },
   { .name = NULL },
 };
 
 static const pw_quantity rolling_reaction[] = {
   { "N", "N", NULL, "lateral force on the body, to the left of the heading" },
   { "T", "N", NULL, "traction: force on the body along the heading" },
+  { "B", "N m", NULL, "torque of the brake on the wheel" },
 };
 
 static const pw_quantity rolling_coordinate[] = {
   { "spin", "rad", "spin_rate", "angle about the axle; increases when rolling along the heading" },
 };
 
+#define ROLLING_SYMBOL "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5"
+
 const pw_kind pw_kind_rolling_wheel = {
   .name = "rolling-wheel",
   .about = "a wheel that rolls without slip, free or driven by a torque about its axle",
-  .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
+  .symbol = ROLLING_SYMBOL,
   TYPE (rolling, pw_rolling_wheel, rolling),
   .bodies = 1,
   .internal = 1,
@@ -120,5 +175,28 @@ const pw_kind pw_kind_rolling_wheel = {
   .force = rolling_force,
   .force_u = rolling_force_u,
   .power = rolling_power,
+  .contact = rolling_contact,
+  .exact = &pw_kind_slipping_wheel,
+  .is_exact = rolling_slips,
+};
+
+const pw_kind pw_kind_slipping_wheel = {
+  .name = "rolling-wheel",
+  .about = "a wheel with a brake that rolls up to a largest force",
+  .symbol = ROLLING_SYMBOL,
+  TYPE (rolling, pw_rolling_wheel, rolling),
+  .bodies = 1,
+  .internal = 1,
+  .rows = 3,
+  .signals = 1,
+  .level = PW_NONHOLONOMIC,
+  .reaction = rolling_reaction,
+  .coordinate = rolling_coordinate,
+  CONSTRAINT (slipping),
+  .limits = slipping_limits,
+  .force = rolling_force,
+  .force_u = rolling_force_u,
+  .power = rolling_power,
+  .loss = slipping_loss,
   .contact = rolling_contact,
 };

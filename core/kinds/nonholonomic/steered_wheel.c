@@ -31,12 +31,12 @@ static inline steered_state steered_at (const pw_batch *batch, int e) {
 
 PREPARE (steered_prepare, pw_steered_wheel, steered) {
   *element = (steered){ { definition->at[0], definition->at[1] } };
-  return limit_check ("grip", definition->grip, definition->grip_sliding, error);
+  return limit_check ("grip", &definition->grip, &definition->grip_sliding, error);
 }
 
 static void steered_limits (const void *definition, pw_bounds *limit) {
   const pw_steered_wheel *wheel = definition;
-  limit_both_sides (wheel->grip, wheel->grip_sliding, limit);
+  limit_both_sides (&wheel->grip, &wheel->grip_sliding, limit);
 }
 
 static void steered_loss (const pw_batch *batch, double *out) {

@@ -10,12 +10,12 @@
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
   *element = contact_across (definition->at, definition->heading);
-  return limit_check ("grip", definition->grip, definition->grip_sliding, error);
+  return limit_check ("grip", &definition->grip, &definition->grip_sliding, error);
 }
 
 static void wheel_limits (const void *definition, pw_bounds *limit) {
   const pw_wheel *wheel = definition;
-  limit_both_sides (wheel->grip, wheel->grip_sliding, limit);
+  limit_both_sides (&wheel->grip, &wheel->grip_sliding, limit);
 }
 
 static void wheel_loss (const pw_batch *batch, double *out) {
