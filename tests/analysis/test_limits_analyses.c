@@ -23,7 +23,8 @@ static const pw_parameter limits_parameters[] = { { PW_AT (limits_block, F), 2, 
 SCENE_WITH (limits_build, limits_parameters, limits_block) {
   pw_add_body (m, &(pw_body){ .name = "block", .mass = 2, .inertia = 1, .rate = { p->v0 } });
   pw_add_slider (m, &(pw_slider){ .name = "S", .body = { "block", "ground" } });
-  pw_add_sliding_friction (m, &(pw_sliding_friction){ .name = "R", .body = { "block", "ground" }, .limit = p->limit });
+  pw_add_sliding_friction (
+      m, &(pw_sliding_friction){ .name = "R", .body = { "block", "ground" }, .limit = { .constant = p->limit } });
   pw_add_drag (m, &(pw_drag){ .name = "D", .body = "block", .linear = 3 });
   pw_add_force (m, &(pw_force){ .name = "F", .body = "block", .fx = { PW_CONSTANT, .constant = p->F } });
 }
