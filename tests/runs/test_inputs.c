@@ -34,7 +34,8 @@ static const pw_parameter sleigh_list[] = { { "pulse", offsetof (sleigh_paramete
 SCENE_WITH (sleigh, sleigh_list, sleigh_parameters) {
   const pw_signal pulse = { PW_PULSE, .pulse = { .height = p->pulse, .start = 0.5, .width = 0.1 } };
   pw_add_body (m, &(pw_body){ .name = "sleigh", .mass = 1, .inertia = 0.5, .rate = { 2 } });
-  pw_add (m, &pw_kind_wheel, &(pw_wheel){ .name = "edge", .body = "sleigh", .at = { -0.25 }, .grip = { .constant = 1 } });
+  pw_add (m, &pw_kind_wheel,
+          &(pw_wheel){ .name = "edge", .body = "sleigh", .at = { -0.25 }, .grip = { .constant = 1 } });
   pw_add (m, &pw_kind_torque,
           &(pw_torque){ .name = "motor", .body = { "sleigh", "ground" }, .value = p->pulse != 0 ? pulse : waiting });
 }
