@@ -33,6 +33,21 @@ TEST (pendulum) {
   check_close ("velocity", check_number ("mobility", "velocity"), 1, 0, "exact");
 }
 
+/* What a wheel uses of its grip is the extremum of its reaction in the run. */
+TEST (limits) {
+  static const char model[] = "tests/models/events-ride-on.yaml --set gA=0.5";
+  cli_good (check_text (
+      "pinwheel check %s --json @/check.json && pinwheel run %s --of max:A.N --of min:A.N --json @/run.json", model,
+      model));
+  const double high = cli_number (cli_file ("run.json"), "of", "max:A.N", NULL),
+               low = cli_number (cli_file ("run.json"), "of", "min:A.N", NULL),
+               used = cli_number (cli_file ("check.json"), "limits", "used", NULL);
+  check_close ("used", used, fmax (high, -low) / 0.5, 1e-12, "the same run");
+  assert_non_null (strstr (cli_file ("check.json"), "\"mode\": \"holds\", \"events\": 0, \"first\": null"));
+  cli_good ("pinwheel check tests/models/events-pendulum.yaml");
+  assert_non_null (strstr (cli_out, "free at the start; 6 events, the first at t = 0.713008 s"));
+}
+
 TEST (spring) {
   cli_write ("spring.yaml", "pinwheel: 1\nrun: {step: 1}\n"
                             "bodies:\n  - {name: block, mass: 1.5, inertia: 0.1, start: {x: 0.8}}\n"

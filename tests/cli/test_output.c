@@ -135,9 +135,10 @@ TEST (lock) {
 #define OUTPUT_INTO "cannot write into @/l/D: another process is writing into it"
   output_locked ("l/D", folder, "PATH=/none pinwheel run ezyroller -t 0.1 --plots @/l/D >@/log", OUTPUT_INTO);
   output_locked ("l/D", folder,
-                 "PATH=/none pinwheel compare ezyroller -m rk4 -t 0.1 --step-ladder 0.1:0.05 -o @/l/D >@/log",
+                 "PATH=/none pinwheel compare ezyroller -m rk4 -t 0.1 --step-ladder 0.1:0.05 --plots @/l/D >@/log",
                  OUTPUT_INTO);
-  output_locked ("l/D", folder, "PATH=/none pinwheel drift ezyroller -m rk4+none --only-methods -t 0.1 -o @/l/D >@/log",
+  output_locked ("l/D", folder,
+                 "PATH=/none pinwheel drift ezyroller -m rk4+none --only-methods -t 0.1 --plots @/l/D >@/log",
                  OUTPUT_INTO);
   cli_good ("rm -rf @/l; mkdir @/l");
   int journal = output_lock ("l/s.csv.part", file);
@@ -401,6 +402,26 @@ TEST (forged) {
   output_forge (-2, -1); /* as an integer: negative */
 }
 
+/* One table in three formats; old spellings of ranges and folders work with a notice. */
+TEST (tables) {
+  cli_good ("pinwheel sweep pendulum --vary l=1:2:3 --of max:bob.vx -t 0.1 -o @/t.csv && "
+            "pinwheel sweep pendulum --vary l=1:2:3 --of max:bob.vx -t 0.1 -o @/t.json --json @/s.json --plots @/t && "
+            "pinwheel sweep pendulum --vary l=1:2:3 --of max:bob.vx -t 0.1 -o @/t.npz && "
+            "python3 -c 'import csv, json, zipfile\n"
+            "rows = list (csv.DictReader (open (\"@/t.csv\")))\n"
+            "table = json.load (open (\"@/t.json\"))\n"
+            "assert list (table) == list (rows[0]) and table[\"status\"] == [\"ok\"] * 3\n"
+            "for k, v in table.items (): assert k in (\"status\", \"reason\") or v == [float (r[k]) for r in rows], k\n"
+            "assert \"max:bob.vx.npy\" in zipfile.ZipFile (\"@/t.npz\").namelist ()\n"
+            "s = json.load (open (\"@/s.json\")); assert s[\"runs\"] == 3 and s[\"failed\"] == 0'");
+  assert_non_null (strstr (cli_file ("t/sweep.svg"), "max:bob.vx"));
+  cli_good (
+      "pinwheel sweep pendulum --vary l=lin:1:2:3 --of max:bob.vx -t 0.1 -o @/old.csv 2>@/notice && cmp @/t.csv "
+      "@/old.csv && pinwheel steady pendulum --starts 0 -o @/old 2>@/notices && ls @/old/steady.csv @/old/steady.json");
+  assert_string_equal (cli_file ("notice"), "pinwheel: --vary l=lin:1:2:3: an old spelling of l=1:2:3\n");
+  assert_non_null (strstr (cli_file ("notices"), "an old spelling of -o "));
+}
+
 /* Formats that are not written are refused with those that are, before anything is written; so are folders with the
  * names of files.  What follows a dot need not be a format. */
 TEST (formats) {
@@ -418,11 +439,12 @@ TEST (formats) {
       "expected a name that ends in .yaml or .yml" },
     { "run pendulum --json @/formats/a.txt", "the format .txt is not written: expected a name that ends in .json" },
     { "run pendulum --plots @/formats/a.png", folder },
-    { "compare pendulum -o @/formats/a.csv", folder },
-    { "drift pendulum -o @/formats/a.pdf", folder },
-    { "steady pendulum -o @/formats/a.json", folder },
-    { "sensitivity pendulum --of bob.phi --by l -o @/formats/a.csv", folder },
-    { "linearise pendulum -o @/formats/a.json", "expected a NAME, for NAME.json, NAME.csv and NAME.npz" },
+    { "compare pendulum --plots @/formats/a.csv", folder },
+    { "drift pendulum -o @/formats/a.pdf", "the format .pdf is not written: expected a name that ends in .csv" },
+    { "steady pendulum --plots @/formats/a.json", folder },
+    { "sensitivity pendulum --of bob.phi --by l -o @/formats/a.yaml",
+      "the format .yaml is not written: expected a name that ends in .csv, .npz or .json" },
+    { "linearise pendulum -o @/formats/a.svg", "expected a name that ends in .csv, .npz or .json" },
     { "check pendulum --json @/formats/a.yaml", "expected a name that ends in .json" },
   };
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
