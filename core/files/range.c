@@ -94,11 +94,6 @@ static pw_range range_sin (double lo, double hi, double shift) {
   return r;
 }
 
-static pw_range range_cosh (const pw_range *x) {
-  pw_range r = range_abs (x);
-  return range_rounded (cosh (fmax (0, r.lo)), cosh (r.hi));
-}
-
 static pw_range range_tan (const pw_range *x) {
   const double slack = 8 * DBL_EPSILON * (fabs (x->lo) + fabs (x->hi) + 1);
   if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_pole;
@@ -109,7 +104,8 @@ static pw_range range_tan (const pw_range *x) {
 static pw_range range_in_domain (const pw_expression_function *f, const pw_range *x) {
   if (f->of_one == pw_sin) return range_sin (x->lo, x->hi, 0);
   if (f->of_one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
-  if (f->of_one == cosh) return range_cosh (x);
+  const pw_range size = range_abs (x);
+  if (f->of_one == cosh) return range_rounded (cosh (fmax (0, size.lo)), cosh (size.hi));
   if (f->of_one == tan) return range_tan (x);
   return f->trend == PW_INCREASING ? range_rounded (f->of_one (x->lo), f->of_one (x->hi))
                                    : range_rounded (f->of_one (x->hi), f->of_one (x->lo));

@@ -317,16 +317,6 @@ static int compile_reads (const compilation *job, pw_source *source, const char 
   return PW_OK;
 }
 
-/* A signal that is a function of an internal coordinate reads this one. */
-static int compile_coordinate (const compilation *job, pw_source *source, int coordinate) {
-  int *state = compile_alloc (job, 1, sizeof *state);
-  if (state == NULL) return PW_RESOURCE;
-  *state = coordinate;
-  source->state = state, source->reads = 1;
-  job->s->reads++, job->s->state_dependent++;
-  return PW_OK;
-}
-
 static int compile_signal (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
   const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
   void *context = opens ? opens->open (opens->context) : NULL;
@@ -368,9 +358,13 @@ static int compile_signals (const compilation *job) {
         source->of_coordinate = k->kind->of_coordinate;
         const pw_signal *signal = pw_field_at (k->kind, from->element->definition, PW_SIGNAL, u);
         int status = compile_signal (job, source, signal, k->name[e]);
-        if (status == PW_OK && source->of_coordinate)
-          status = compile_coordinate (job, source, k->internal + e * k->kind->internal);
         if (status != PW_OK) return status;
+        if (!source->of_coordinate) continue;
+        int *state = compile_alloc (job, 1, sizeof *state); /* the internal coordinate whose function it is */
+        if (state == NULL) return PW_RESOURCE;
+        *state = k->internal + e * k->kind->internal;
+        source->state = state, source->reads = 1;
+        s->reads++, s->state_dependent++;
       }
   return PW_OK;
 }

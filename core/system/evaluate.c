@@ -843,23 +843,6 @@ void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *led
   }
 }
 
-/* F -= J^T lambda of each element, only the columns of bodies. */
-static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
-  const double *J = k->J;
-  int cols = 3 * k->kind->bodies;
-  for (int e = 0; e < k->b.count; e++, F += cols)
-    for (int i = 0; i < k->kind->rows; i++, J += k->b.cols, lambda++)
-      for (int c = 0; c < cols; c++) F[c] -= J[c] * *lambda;
-}
-
-/* F += the force of each element, only the components of bodies. */
-static void elements_applied (const pw_element_batch *k, double *F) {
-  int cols = 3 * k->kind->bodies;
-  k->kind->force (&k->b, k->block);
-  for (int e = 0; e < k->b.count; e++, F += cols)
-    for (int c = 0; c < cols; c++) F[c] += k->block[e * k->b.cols + c];
-}
-
 int pw_system_force_size (const pw_system *s) {
   int size = 0;
   for (int i = 0; i < s->batches; i++) size += 3 * s->batch[i].b.count * s->batch[i].kind->bodies;
@@ -872,10 +855,14 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
   if (status != PW_OK) return status;
   memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
   pw_evaluate_J (w);
-  PW_EACH_BATCH (k, w) {
-    if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
-    if (k->kind->force) elements_applied (k, out);
-    out += 3 * k->b.count * k->kind->bodies;
+  PW_EACH_BATCH (k, w) { /* force - J^T lambda of each element, only the components of bodies */
+    const int rows = k->kind->rows, cols = 3 * k->kind->bodies;
+    if (k->kind->force) k->kind->force (&k->b, k->block);
+    for (int e = 0; e < k->b.count; e++, out += cols) {
+      for (int i = e * rows; i < (e + 1) * rows; i++)
+        for (int c = 0; c < cols; c++) out[c] -= k->J[i * k->b.cols + c] * lambda[k->row + i];
+      for (int c = 0; c < cols && k->kind->force; c++) out[c] += k->block[e * k->b.cols + c];
+    }
   }
   return PW_OK;
 }

@@ -412,7 +412,6 @@ static void search_piece (search *s, int i) {
   if (b[5] < 0 && i == p->pieces - 1 && !p->closed) search_try (s, i, 1);
 }
 
-/* Searches the least distance. */
 static void search_all (search *s) {
   const pw_path *p = s->p;
   double slope[3], bound = INFINITY;

@@ -172,7 +172,6 @@ static double massless_square (const pw_component *c, int i, const double *weigh
   return sum;
 }
 
-/* Exchanges two rows. */
 static void massless_swap (pw_component *c, int a, int b) {
   if (a == b) return;
   massless_row row = c->row[a];
