@@ -102,7 +102,10 @@ class Ensemble:
         if hasattr(state, "items"):
             for name in state:
                 if name not in self.number:
-                    raise lib.InputError(f"no state {name!r:.60}{_nearest(name, self.states)}")
+                    error = lib.pw_error()
+                    lib.core.pw_system_find_state(self._systems[0].pointer, lib.encode(name, "state"), c.byref(error))
+                    lib.check(error)
+                    raise lib.InputError(f"{name!r:.60} cannot be set")
             return {self.number[name]: lib.number(value, name) for name, value in state.items()}
         return dict(zip(self.number.values(), array(state, (len(self.states),), "state").tolist()))
 

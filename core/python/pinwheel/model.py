@@ -89,11 +89,15 @@ class _System(lib.Handle):
 
     def call(self, function, *arguments):
         """The result of a function of the library that evaluates the system, whose last argument is an error."""
-        error, call = lib.pw_error(), lib.Call()
-        with call if self.in_python else contextlib.nullcontext():
-            result = function(*arguments, c.byref(error))
+        error = lib.pw_error()
+        if self.in_python:
+            with lib.Call() as call:
+                result = function(*arguments, c.byref(error))
+            check = call.check
+        else:
+            result, check = function(*arguments, c.byref(error)), lib.check
         try:
-            call.check(error)
+            check(error)
         except BaseException:
             if function is lib.core.pw_run_open:
                 lib.core.pw_run_close(result)
