@@ -110,7 +110,7 @@ static double crossing_first (pw_crossing_search *x, double a, const double *at_
     if (!isnan (first)) return first;
     return middle > 0 ? m : crossing_first (x, m, at_m, b, at_b, depth - 1);
   }
-  for (int i = 0; i < x->count && !straight; i++) {
+  for (int i = 0; i < x->count && !straight && !(middle > 0); i++) {
     const crossing_point at[] = { { a, at_a[i] }, { m, at_m[i] }, { b, at_b[i] } };
     const double peak = crossing_peak (x, i, at[0], at[1], at[2]);
     if (!isnan (peak)) return peak;
