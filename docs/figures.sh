@@ -47,15 +47,15 @@ for figure in mechanism paths velocities angular energy; do
 done
 draw ezyroller-free mechanism run ezyroller --set M0=0 --start frame.vx=1 --start frame.vy=0 --start frame.omega=0 \
   --start steer.phi=-1.5707963267948966 --start steer.x=0.5 --start steer.y=-0.125 --t-end 1 --plots
-draw ezyroller-work-precision work-precision compare ezyroller -o
+draw ezyroller-work-precision work-precision compare ezyroller --plots
 
 # ---- Lessons ----
 
 draw lesson-drift drift drift pendulum --t-end 100 --step 0.01 --only-methods \
-  --methods rk4+none,rk4+baumgarte,rk4+projection,ida+ggl -o
-draw lesson-cost work-precision compare pendulum --methods rk4+projection,erk5+projection,erk8+projection,ida+ggl -o
+  --methods rk4+none,rk4+baumgarte,rk4+projection,ida+ggl --plots
+draw lesson-cost work-precision compare pendulum --methods rk4+projection,erk5+projection,erk8+projection,ida+ggl --plots
 
-draw bench-drift drift drift pendulum --t-end 100 --step 0.01 -o
+draw bench-drift drift drift pendulum --t-end 100 --step 0.01 --plots
 
 # ---- Analyses ----
 
@@ -64,8 +64,8 @@ draw optimise-snakeboard optimise optimise snakeboard --maximise board.x --free 
 
 car=$work/car-trailer.yaml
 awk '/^```yaml/ { n++; next } /^```/ { if (n == 1) exit } n == 1' docs/analysis.md >"$car"
-draw steady-car-trailer steady steady "$car" --vary u=2:60 --starts 0 -o
-draw sensitivity-car-trailer sensitivity sensitivity "$car" --start trailer.omega=0.2 --of rms:trailer.omega --of trailer.omega --by u --by ahead --by grip -o
+draw steady-car-trailer steady steady "$car" --vary u=2:60 --starts 0 --plots
+draw sensitivity-car-trailer sensitivity sensitivity "$car" --start trailer.omega=0.2 --of rms:trailer.omega --of trailer.omega --by u --by ahead --by grip --plots
 if wanted fit-car-trailer; then
   "$pinwheel" run "$car" --set steer=0.02 --set ahead=0.15 --set grip=6e4 --every 0.05 -o "$work/run.csv" >/dev/null
   awk -F, 'NR == 1 { print $1 "," $7 "," $19 } NR > 1 { printf "%s,%.3f,%.3f\n", $1, $7, $19 }' "$work/run.csv" >"$work/measured.csv"
@@ -74,8 +74,8 @@ draw fit-car-trailer fit fit "$car" --set steer=0.02 --data "$work/measured.csv"
 if wanted periodic-racer || wanted periodic-swing; then
   awk '/^```yaml/ { n++; next } /^```/ { if (n == 2) exit } n == 2' docs/analysis.md >"$work/racer.yaml"
 fi
-draw periodic-racer periodic periodic "$work/racer.yaml" -o
-draw periodic-swing periodic periodic "$work/racer.yaml" --vary swing=0.2:1 -o
+draw periodic-racer periodic periodic "$work/racer.yaml" --plots
+draw periodic-swing periodic periodic "$work/racer.yaml" --vary swing=0.2:1 --plots
 
 # ---- Pages, benchmarks ----
 

@@ -506,10 +506,8 @@ def _output(name, described, folder, tables):
     """The option, found in the command's help, that makes it write to the folder; None if it has none."""
     if "--json" in described:
         return f"--json={folder / name}.json"
-    if "-o, --name=NAME" in described:
-        return f"--name={folder / name}"
-    if "-o, --output=DIR" in described and (tables or f"{name}.json" in described):
-        return f"--output={folder}"
+    if tables and "-o, --output=FILE.csv" in described:
+        return f"--output={folder / name}.csv"
     return None
 
 
