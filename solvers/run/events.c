@@ -648,6 +648,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     }
   }
   events_apply (r); /* forces of those outside D */
+  if (r->update_given) r->update_given (r);
 }
 
 /* decision_pivot, where one that slides may have a smaller multiplier than one that holds.  x are `unit` times what
