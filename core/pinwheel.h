@@ -85,7 +85,8 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
 /* The source text of a function signal in a text model. */
 typedef struct {
   const char *part[3]; /* expressions of value, rate, acceleration; NULL: not given */
-  const char *jump; /* an operation in them that may jump within a step, as it reads states: "sign (a.vx)"; or NULL */
+  const char
+      *jump; /* an operation in them that may jump within a step, as it reads states: "atan2 (a.y, a.x)"; or NULL */
 } pw_signal_text;
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
@@ -108,6 +109,11 @@ typedef struct {
   /* Bounds of value[0] for all times from lo[0] to hi[0] and states x from lo + 1 to hi + 1: least and largest value,
    * infinite if unknown.  Steps are then short enough to see what is narrow.  May be NULL. */
   void (*range) (void *context, const double *lo, const double *hi, double bounds[2]);
+  /* Conditions on states at which the value jumps or has a kink; the result is their number.  beyond NULL: fixes the
+   * side of each for later calls of eval, to that of (t, x), so that they return a smooth function, also beyond; x
+   * NULL: ends that.  Otherwise stores how far (t, x) is beyond the fixed side of each one, negative on it.  Steps end
+   * where one becomes positive.  Needs `open`.  May be NULL. */
+  int (*sides) (void *context, double t, const double *x, double *beyond);
 } pw_function;
 
 /* offset + amplitude cos (omega t + phase) */

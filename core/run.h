@@ -140,6 +140,7 @@ typedef struct {
   long factorisations; /* of any matrix */
   long restarts;       /* at checkpoints, of methods without pw_method.serialise */
   long specialised;    /* of the evaluations, by specialised code */
+  long conditions;     /* changes of sides of conditions on states, where steps end */
   long unresolved;     /* of fixed steps, those in which a signal changes more than they see */
   double position;     /* worst scaled residual of g = 0 */
   double velocity;     /* worst scaled residual of J v = eta */

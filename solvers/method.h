@@ -80,6 +80,28 @@ int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
  * Returns PW_METHOD. */
 int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 
+/* ---- Conditions on states in signals (sides.c) ---- */
+
+typedef struct {
+  int count;                                         /* conditions; arrays of this length, unless said otherwise */
+  int fixed;                                         /* 1: their sides are */
+  double *start, *end, *start_rate, *end_rate, *now; /* how far they are beyond their sides in a step, and the rates */
+  double *memory;                                    /* of pw_first_crossing */
+  double *read;                                      /* states that a signal reads */
+  double t, *state;                                  /* 2 coords: where the sides have been fixed */
+  unsigned char *changed;                            /* 1: at the state reached */
+  double h;                                          /* length of the last step, or 0 */
+  struct {
+    double t, projected, *q, *ledger; /* as pw_run.q_at, ... */
+  } found;                            /* the first sample beyond a side */
+} pw_sides;
+
+/* Fixes the sides at the state reached, where signals must be evaluated again (dynamics.c).  Does nothing without
+ * conditions. */
+void pw_run_fix_sides (struct pw_run *r);
+void pw_run_free_sides (struct pw_run *r);
+void pw_run_serialise_sides (struct pw_run *r, pw_archive *a);
+
 /* ---- The data of a run ---- */
 
 enum { PW_MAX_OPTIONS = 12 };
@@ -120,6 +142,7 @@ struct pw_run {
   pw_event *event;        /* events so far: `event_count` of them */
   long event_count;
   size_t event_room;
+  pw_sides *sides;                  /* of conditions in signals; NULL: there are none */
   struct pw_resolution *resolution; /* of signals that change within less than a step (resolution.h); NULL: none */
   int predicted;                    /* 0: the state has changed since it was used to look ahead */
   double resolved_until;            /* time until which fixed steps resolve them */

@@ -29,7 +29,8 @@ static inline int pw_require (const void *object, const char *type, pw_error *er
 /* ---- Members of pw_statistics, as checkpoints and JSON contain them ---- */
 
 #define PW_STATISTICS_COUNTS(X) \
-  X (steps) X (rejected) X (rhs) X (jacobians) X (factorisations) X (restarts) X (specialised) X (unresolved)
+  X (steps)                     \
+  X (rejected) X (rhs) X (jacobians) X (factorisations) X (restarts) X (specialised) X (conditions) X (unresolved)
 #define PW_STATISTICS_RESIDUALS(X) X (position) X (velocity) X (g) X (jv)
 
 /* ---- Nearest names, domains of numbers (text.c) ---- */

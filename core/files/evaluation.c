@@ -13,6 +13,8 @@
 #include "expression_parts.h"
 #include "pinwheel.h"
 
+#define SIDE_ROUND_OFF (16 * DBL_EPSILON) /* of a condition's operands */
+
 /* ---- Derivatives of functions (Abramowitz & Stegun 1964, chapters 4 and 17) ---- */
 
 #define PARTIALS_OF_ONE(name, first, second)                          \
@@ -262,6 +264,136 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
       last = value_of (c, left, last, may_jump);
     }
   return last;
+}
+
+/* ---- Sides of conditions on states ----
+ *
+ * A condition is an operation with jumps or kinks whose operands depend on states: a comparison, abs, sign, floor,
+ * ceil, round, min, max or mod.  With its side fixed (the truth of the comparison, the sign of the operand of abs, the
+ * value of floor, the smaller operand, the quotient), the expression is smooth and has a value on both sides. */
+
+static int side_is_condition (int op) {
+  return (op >= PW_OP_ABS && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_MAX);
+}
+
+static double side_natural (const pw_expression_code *c, double a, double b) {
+  if (c->op == PW_OP_ABS) return a < 0 ? -1 : 1;
+  if (c->op == PW_OP_MIN) return isnan (a) || b < a;
+  if (c->op == PW_OP_MAX) return isnan (a) || b > a;
+  if (c->op == PW_OP_MOD) return rint ((a - value_mod (a, b)) / b);
+  return pw_expression_apply (c, a, b);
+}
+
+static double side_value (int op, double side, double a, double b) {
+  if (op == PW_OP_ABS) return side * a;
+  if (op == PW_OP_MIN || op == PW_OP_MAX) return side ? b : a;
+  return op == PW_OP_MOD ? a - side * b : side;
+}
+
+/* How far the operands are beyond the side, up to round-off; negative: they are on it. */
+static double side_beyond (int op, double side, double a, double b) {
+  switch (op) {
+  case PW_OP_ABS:
+    return -side * a;
+  case PW_OP_SIGN:
+    return side == 0 ? fabs (a) : -side * a;
+  case PW_OP_FLOOR:
+    return fmax (side - a, a - side - 1);
+  case PW_OP_CEIL:
+    return fmax (side - 1 - a, a - side);
+  case PW_OP_ROUND:
+    return fabs (a - side) - 0.5;
+  case PW_OP_EQUAL:
+  case PW_OP_UNEQUAL: /* that numbers become equal is no event: they differ at once */
+    return side == (op == PW_OP_EQUAL) ? fabs (a - b) : -INFINITY;
+  case PW_OP_MOD:
+    return fmax (side - a / b, a / b - side - 1) * fabs (b);
+  case PW_OP_MAX:
+  case PW_OP_LESS:
+  case PW_OP_LESS_EQUAL:
+    return side ? a - b : b - a;
+  default: /* min, > and >= */
+    return side ? b - a : a - b;
+  }
+}
+
+/* A value on the stack. */
+typedef struct {
+  double value, size; /* size: of numbers of which it is the sum, for round-off */
+  int of_states;
+  int first, condition; /* its first operation among those with fixed sides; its first condition */
+} side_number;
+
+/* Replaces operations with a fixed side by others: those of operands a and b begin at `second`. */
+static int side_fix_code (pw_expression_code *code, int n, int op, double side, int first, int second) {
+  const pw_expression_code constant = { PW_OP_CONSTANT, 0, { side } };
+  if (op == PW_OP_ABS) {
+    if (side < 0) code[n++] = (pw_expression_code){ .op = PW_OP_NEGATE };
+    return n;
+  }
+  if (op == PW_OP_MOD) { /* a - side b */
+    code[n++] = constant;
+    code[n++] = (pw_expression_code){ .op = PW_OP_MULTIPLY };
+    code[n++] = (pw_expression_code){ .op = PW_OP_SUBTRACT };
+    return n;
+  }
+  if (op != PW_OP_MIN && op != PW_OP_MAX) return code[first] = constant, first + 1;
+  if (side == 0) return second;
+  memmove (code + first, code + second, (size_t)(n - second) * sizeof *code);
+  return first + n - second;
+}
+
+int pw_expression_sides (const pw_expression *x, const double *variable, double *side, double *beyond,
+                         pw_expression *fixed) {
+  side_number stack[PW_EXPRESSION_STACK], *top = stack;
+  int conditions = 0, n = 0;
+  pw_expression_code *code = fixed ? fixed->code : NULL;
+  for (const pw_expression_code *c = x->code, *end = c + x->codes; c < end; c++) {
+    const int operands = pw_expression_operands (c->op);
+    side_number *a = top -= operands, *b = a + (operands > 1), result = { .first = n, .condition = conditions };
+    if (operands) result = *a;
+    for (int i = 1; i < operands; i++) result.of_states |= a[i].of_states, result.size += a[i].size;
+    if (operands == 0) {
+      result.value = c->op == PW_OP_CONSTANT ? c->value : variable[c->index];
+      result.size = fabs (result.value);
+      result.of_states = c->op == PW_OP_VARIABLE && c->index != PW_EXPRESSION_TIME;
+      if (code) code[n++] = *c;
+    } else if (side_is_condition (c->op) && result.of_states) {
+      double *s = &side[conditions];
+      if (beyond == NULL) *s = side_natural (c, a->value, b->value);
+      if (beyond) beyond[conditions] = side_beyond (c->op, *s, a->value, b->value) - SIDE_ROUND_OFF * result.size;
+      result.value = side_value (c->op, *s, a->value, b->value);
+      if (c->op != PW_OP_ABS && c->op != PW_OP_MOD && c->op != PW_OP_MIN && c->op != PW_OP_MAX) result.size = fabs (*s);
+      if (code) n = side_fix_code (code, n, c->op, *s, a->first, b->first);
+      conditions++;
+    } else if (c->op == PW_OP_SELECT) {
+      const int which = a->value != 0 ? 1 : 2, other_end = which == 1 ? conditions : a[2].condition;
+      for (int i = a[3 - which].condition; beyond && i < other_end; i++) beyond[i] = -INFINITY; /* does not matter */
+      result.value = a[which].value, result.size = a[which].size;
+      const int chosen = a[which].first, chosen_end = which == 1 ? a[2].first : n;
+      if (code && a[1].first == a->first + 1 && code[a->first].op == PW_OP_CONSTANT) {
+        memmove (code + a->first, code + chosen, (size_t)(chosen_end - chosen) * sizeof *code);
+        n = a->first + chosen_end - chosen;
+      } else if (code)
+        code[n++] = *c;
+    } else {
+      double value[3] = { 0 };
+      if (c->op == PW_OP_PATH_NEAREST)
+        path_nearest (c, a[0].value, a[1].value, a[2].value, value);
+      else
+        *value = pw_expression_apply (c, a->value, b->value);
+      result.value = *value;
+      if (c->op == PW_OP_MULTIPLY) result.size = a->size * b->size;
+      if (c->op == PW_OP_DIVIDE)
+        result.size = a->size / fabs (b->value);
+      else if (c->op != PW_OP_MULTIPLY && c->op != PW_OP_ADD && c->op != PW_OP_SUBTRACT && c->op != PW_OP_NEGATE)
+        result.size = fabs (result.value);
+      if (code) code[n++] = *c;
+    }
+    *top++ = result;
+  }
+  if (fixed) fixed->codes = n;
+  return conditions;
 }
 
 /* ---- Derivatives ---- */

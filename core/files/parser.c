@@ -157,7 +157,7 @@ typedef struct {
   int breaks;
   pw_jumps jumps;
   const char *jump;
-  int jump_size;
+  int jump_size, unlocated;
   int codes;
   pw_expression_code code[PW_EXPRESSION_CODES];
 } parser;
@@ -242,11 +242,13 @@ static parser_part parser_operation (parser *p, parser_part part, int depends, i
   int at_one_point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps, and back at once */
   if (at_one_point || !(part.depends & DEPENDS_ON_STATES)) return part;
   const pw_jumps jumps = pw_expression_may_jump (p->code + part.first, p->codes - part.first);
-  if (jumps > p->jumps) {
-    p->jumps = jumps;
+  const int unlocated = jumps > PW_JUMPS_NEVER && (op == PW_OP_ATAN2 || pw_expression_has_path (op));
+  if (unlocated > p->unlocated || (unlocated == p->unlocated && jumps > p->jumps)) {
+    p->unlocated = unlocated;
     p->jump = p->text + part.from;
     p->jump_size = (int)(p->previous_end - part.from);
   }
+  if (jumps > p->jumps) p->jumps = jumps;
   return part;
 }
 
@@ -515,7 +517,7 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
                         const pw_expression **x, pw_expression_error *error) {
   parser p;
   if (parser_read (&p, s, variable, text, error) != PW_OK) return p.status;
-  pw_expression head = { p.codes, p.breaks, p.jumps, p.jump, p.jump_size },
+  pw_expression head = { p.codes, p.breaks, p.jumps, p.jump, p.jump_size, p.unlocated },
                 *copy = pw_arena_alloc (arena, pw_expression_size (&head));
   if (copy == NULL) return PW_RESOURCE;
   *copy = head;

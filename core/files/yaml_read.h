@@ -27,6 +27,13 @@ typedef struct {
   int derivatives;                    /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
   int states;                         /* number of states in it */
   pw_jumps jumps;
+  const char *jump; /* an operation that jumps, as pw_expression.jump */
+  /* conditions on states: their number and, in the context of a workspace, the expression with and without them, and
+   * their sides; expression[0] is one of the two */
+  int conditions;
+  const pw_expression *whole;
+  pw_expression *fixed;
+  double *side;
   const char *name[PW_OUTPUT_READS + 2]; /* "t" or "s", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
 } pw_signal_function;

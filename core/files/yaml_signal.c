@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include "expression_parts.h"
 #include "yaml_read.h"
 
 /* ---- Signals that are expressions ----
@@ -43,14 +44,28 @@ static int signal_eval (void *context, double t, const double *state, double val
     /* 0 where the derivative is unknown, such as that of sqrt (vx^2 + vy^2) at rest. */
     gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
-  return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
+  if (isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2])))) return 0;
+  if (f->fixed == NULL || f->expression[0] == f->whole) return -1;
+  pw_signal_function free = *f; /* beyond its side, "x > 0 ? sqrt (x) : 0" has no value */
+  free.expression[0] = f->whole;
+  return signal_eval (&free, t, state, value, gradient);
+}
+
+static int signal_sides (void *context, double t, const double *state, double *beyond) {
+  pw_signal_function *f = context;
+  double variable[PW_OUTPUT_READS + 1] = { t };
+  if (state) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
+  if (state) pw_expression_sides (f->whole, variable, f->side, beyond, beyond ? NULL : f->fixed);
+  if (!beyond) f->expression[0] = state ? f->fixed : f->whole;
+  return f->conditions;
 }
 
 static double signal_breakpoint (void *context, double t) {
   const pw_signal_function *f = context;
   double first = INFINITY;
   for (int i = 0; i < 3; i++)
-    if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
+    if (f->expression[i])
+      first = fmin (first, pw_expression_breakpoint (i == 0 && f->whole ? f->whole : f->expression[i], t));
   return first;
 }
 
@@ -64,7 +79,9 @@ static void *signal_open (void *context) {
   size_t bytes[3] = { 0 };
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) bytes[i] = pw_expression_size (f->expression[i]);
-  pw_signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
+  const size_t conditions = (size_t)f->conditions, sides = conditions * sizeof *f->side,
+               fixed = conditions ? bytes[0] + 2 * conditions * sizeof *f->whole->code : 0;
+  pw_signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2] + sides + fixed);
   if (copy == NULL) return NULL;
   *copy = *f;
   char *at = (char *)(copy + 1);
@@ -73,13 +90,17 @@ static void *signal_open (void *context) {
       copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
       pw_expression_share_paths (copy->expression[i]);
     }
+  copy->whole = copy->expression[0];
+  if (conditions == 0) return copy;
+  copy->side = (double *)(void *)at;
+  copy->fixed = memcpy (at + sides, f->expression[0], sizeof *copy->fixed); /* without its code */
   return copy;
 }
 
 static void signal_close (void *context) {
   const pw_signal_function *f = context;
   for (int i = 0; i < 3; i++)
-    if (f->expression[i]) pw_expression_release_paths (f->expression[i]);
+    if (f->expression[i]) pw_expression_release_paths (i == 0 ? f->whole : f->expression[i]);
   free (context);
 }
 
@@ -215,10 +236,12 @@ static int signal_expression (pw_reader *r, const pw_node *written, pw_signal_fu
   if (pw_yaml_expression (r, node, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
   const pw_expression *expression = f->expression[i];
   f->jumps = f->jumps > expression->jumps ? f->jumps : expression->jumps;
-  if (expression->jump == NULL || f->text.jump) return PW_OK;
+  if (expression->jump == NULL || f->jump) return PW_OK;
   char *jump = pw_arena_alloc (r->arena, (size_t)expression->jump_size + 1);
-  f->text.jump = jump ? memcpy (jump, expression->jump, (size_t)expression->jump_size) : NULL;
-  return jump ? PW_OK : read_no_memory (r);
+  if (jump == NULL) return read_no_memory (r);
+  f->jump = memcpy (jump, expression->jump, (size_t)expression->jump_size);
+  if (expression->unlocated) f->text.jump = jump;
+  return PW_OK;
 }
 
 /* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
@@ -266,7 +289,7 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal
   double t = is_curve ? -1000 : 0, before[3], after[3];
   if (f->states && f->jumps == PW_JUMPS)
     return read_fail (r, node->at, "%s: %.60s jumps as states change, and the signal of a velocity constraint must not",
-                      r->label, f->text.jump);
+                      r->label, f->jump);
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
     t = signal_breakpoint (f, t);
     if (t == INFINITY) return PW_OK;
@@ -284,6 +307,11 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal
                                                : "a velocity constraint");
   }
   return PW_OK;
+}
+
+static int signal_conditions (const pw_expression *x) {
+  double variable[PW_OUTPUT_READS + 1] = { 0 }, side[PW_EXPRESSION_CODES];
+  return pw_expression_sides (x, variable, side, NULL, NULL);
 }
 
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
@@ -310,6 +338,8 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
     if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
   }
   if (f->states) signal->function.reads = f->name + 1;
+  if (f->states) f->conditions = signal_conditions (f->expression[0]);
+  if (f->conditions) signal->function.sides = signal_sides;
   return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
 }
 
@@ -651,7 +681,8 @@ static int output_head (pw_reader *r, const pw_node *node) {
   if ((o->node.text = pw_yaml_renamed (&counter, v[1]->text, r->arena)) == NULL) return read_no_memory (r);
   o->reader = PW_OUTPUT_UNREAD;
   o->function.name[0] = "t";
-  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text, NULL };
+  o->output.value =
+      (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text, NULL, NULL };
   pw_names_add (&r->outputs, o->output.name, r->output_count);
   r->output[r->output_count++] = o;
   if (pw_yaml_si_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;

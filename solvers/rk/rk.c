@@ -957,7 +957,7 @@ static int several_possible (const pw_run *r) {
     return 0;
   if (d->projects && (d->every > 1 || d->projector.owns_velocity)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
-         !r->interrupted && (r->resolution == NULL || r->predicted) && r->stalled == 0 &&
+         !r->interrupted && r->sides == NULL && (r->resolution == NULL || r->predicted) && r->stalled == 0 &&
          !(r->watchdog.saddle && r->watchdog.singular_ahead) && r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 

@@ -342,3 +342,45 @@ double pw_run_option (const pw_run *r, const char *name) {
   while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
   return r->method->options[i].name ? r->option[i] : 0;
 }
+
+/* ---- Sides of conditions in signals (sides.c) ---- */
+
+/* Fixes the sides at a state; q NULL: frees them. */
+static void sides_fix (pw_run *r, double t, const double *q, const double *v) {
+  if (r->sides == NULL) return;
+  for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
+    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL) continue;
+    for (int i = 0; q && i < x->reads; i++) {
+      const int j = x->state[i];
+      x->x[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];
+    }
+    x->signal.function.sides (x->signal.function.context, t, q ? x->x : NULL, NULL);
+  }
+  r->sides->fixed = q != NULL;
+  r->w->t_signal = NAN;
+}
+
+void pw_run_fix_sides (pw_run *r) {
+  const size_t n = (size_t)r->s->coords;
+  if (r->sides == NULL) return;
+  r->sides->t = r->t;
+  memcpy (r->sides->state, r->q, n * sizeof *r->q);
+  memcpy (r->sides->state + n, r->v, n * sizeof *r->v);
+  sides_fix (r, r->t, r->q, r->v);
+}
+
+void pw_run_free_sides (pw_run *r) {
+  sides_fix (r, r->t, NULL, NULL);
+}
+
+void pw_run_serialise_sides (pw_run *r, pw_archive *a) {
+  pw_sides *x = r->sides;
+  if (x == NULL) return;
+  pw_archive_bytes (a, &x->t, sizeof x->t);
+  pw_archive_bytes (a, &x->fixed, sizeof x->fixed);
+  pw_archive_bytes (a, &x->h, sizeof x->h);
+  pw_archive_bytes (a, x->changed, (size_t)x->count);
+  pw_archive_bytes (a, x->state, 2 * (size_t)r->s->coords * sizeof *x->state);
+  pw_archive_bytes (a, &r->interrupted, sizeof r->interrupted);
+  if (a->loading && !a->failed && x->fixed) sides_fix (r, x->t, x->state, x->state + r->s->coords);
+}

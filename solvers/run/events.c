@@ -889,6 +889,12 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
   return status;
 }
 
+void pw_events_forget (pw_run *r) {
+  pw_events *x = r->events;
+  x->pending = x->fell = 0, x->start_t = x->previous_t = NAN;
+  memset (x->armed, 0, (size_t)x->count);
+}
+
 int pw_events_advance (pw_run *r, double t_end, pw_error *error) {
   int status = events_prepare (r, error);
   const double t0 = r->t, longest = r->fixed_steps ? INFINITY : r->events->longest;

@@ -24,6 +24,9 @@ int pw_events_check_modes (pw_run *r, const double *v, const double *lambda, pw_
  * makes a step; if there is an event in it, the state there becomes the state reached. */
 int pw_events_advance (pw_run *r, double t_end, pw_error *error);
 
+/* After the last step has been shortened: events found in it have not been reached. */
+void pw_events_forget (pw_run *r);
+
 /* ---- For moreau, which decides impulses of whole steps in place of events ---- */
 
 /* From now on no equation with limits is enforced; multipliers are given ones, at first those of the initial state.

@@ -15,12 +15,13 @@
 #include "resolution.h"
 #include "util.h"
 
-#define RESOLUTION_SEEN 0.25    /* deviation over the largest difference of the values seen */
-#define RESOLUTION_SHRINKS 0.6  /* of bounds when a part is halved, if they are only too wide: about 0.5 */
-#define RESOLUTION_SHARE 0.1    /* of the tolerance, by which a step may miss what a signal does */
-#define RESOLUTION_FIXED 1e-6   /* the tolerance of fixed steps */
-#define RESOLUTION_LEAST 1e-10  /* of the span: shorter times are not examined: the bounds are too wide */
-enum { RESOLUTION_DEPTH = 5 };  /* most halvings of a part */
+#define RESOLUTION_SEEN 0.25   /* deviation over the largest difference of the values seen */
+#define RESOLUTION_SHARE 0.1   /* of the tolerance, by which a step may miss what a signal does */
+#define RESOLUTION_FIXED 1e-6  /* the tolerance of fixed steps */
+#define RESOLUTION_LEAST 1e-10 /* of the span: shorter times are not examined: the bounds are too wide */
+#define RESOLUTION_NARROWER \
+  0.75                         /* widths of bounds of a half over that of the whole, at most, where nothing is narrow */
+enum { RESOLUTION_DEPTH = 3 }; /* most halvings of a part */
 enum { RESOLUTION_AHEAD = 16 }; /* fixed steps examined at once */
 
 typedef struct {
@@ -55,14 +56,11 @@ static double resolution_value (const pw_run *r, resolution_signal *x, double s)
   return x->at.u[0];
 }
 
-/* 1 if the deviation from the line from ya at a to yb at b is proved to be at most `most`, or bounds are unknown.
- * Bounds of functions of states are too wide, by an amount that shrinks with the part: `whole` is the deviation in the
- * part that was halved. */
-static int resolution_is_near (pw_run *r, const resolution_signal *x, double a, double b, double ya, double yb,
-                               double most, int depth, double whole) {
+/* Bounds of the signal between two times, on the path predicted. */
+static void resolution_bounds (pw_run *r, const resolution_signal *x, double a, double b, double bounds[2]) {
   struct pw_resolution *d = r->resolution;
-  double bounds[2];
-  d->lo[0] = pw_before_breakpoint (r, r->t + a), d->hi[0] = pw_before_breakpoint (r, r->t + b);
+  d->lo[0] = r->t + (a > 0 ? a : 1e-6 * b); /* less at discontinuities: "t > 1" does not hold at t = 1 */
+  d->hi[0] = fmax (d->lo[0], fmin (r->t + b, r->breakpoint - 1e-6 * (b - a)));
   for (int i = 0; i < x->at.reads; i++) {
     const int j = x->at.state[i], position = j < r->s->coords;
     const double from = resolution_state (r, j, a), to = resolution_state (r, j, b);
@@ -70,13 +68,27 @@ static int resolution_is_near (pw_run *r, const resolution_signal *x, double a, 
     d->lo[i + 1] = fmin (from, to) - bend, d->hi[i + 1] = fmax (from, to) + bend;
   }
   pw_signal_bounds (&x->at, d->lo, d->hi, bounds);
-  if (!(bounds[1] - bounds[0] < INFINITY)) return 1;
-  const double deviation = fmax (bounds[1] - fmin (ya, yb), fmax (ya, yb) - bounds[0]);
-  if (deviation <= most) return 1;
-  if (depth == 0) return x->at.reads > 0 && deviation <= RESOLUTION_SHRINKS * whole;
-  const double m = a + (b - a) / 2, ym = ya + (yb - ya) / 2;
-  return resolution_is_near (r, x, a, m, ya, ym, most, depth - 1, deviation) &&
-         resolution_is_near (r, x, m, b, ym, yb, most, depth - 1, deviation);
+}
+
+/* 1 if the deviation from the line from ya at a to yb at b is proved to be at most `most`, or bounds are unknown.  In
+ * the smallest parts the value in the middle decides, if bounds of both halves are narrower in proportion: they are too
+ * wide, as of a difference of numbers that change alike, but there is nothing narrow. */
+static int resolution_is_near (pw_run *r, resolution_signal *x, double a, double b, double ya, double yb, double most,
+                               int depth) {
+  double bounds[2];
+  resolution_bounds (r, x, a, b, bounds);
+  const double width = bounds[1] - bounds[0], m = a + (b - a) / 2, ym = ya + (yb - ya) / 2;
+  if (!(width < INFINITY)) return 1;
+  if (fmax (bounds[1] - fmin (ya, yb), fmax (ya, yb) - bounds[0]) <= most) return 1;
+  if (depth > 0)
+    return resolution_is_near (r, x, a, m, ya, ym, most, depth - 1) &&
+           resolution_is_near (r, x, m, b, ym, yb, most, depth - 1);
+  if (!(fabs (resolution_value (r, x, m) - ym) <= most)) return 0;
+  for (int half = 0; half < 2; half++) {
+    resolution_bounds (r, x, half ? m : a, half ? b : m, bounds);
+    if (!(bounds[1] - bounds[0] <= RESOLUTION_NARROWER * width)) return 0;
+  }
+  return 1;
 }
 
 /* ---- The time that is resolved ---- */
@@ -86,8 +98,8 @@ static int resolution_resolved (pw_run *r, resolution_signal *x, double H) {
                y2 = resolution_value (r, x, H), rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol;
   const double missed = RESOLUTION_SHARE * rtol * (x->effect > 0 ? 1 / (x->effect * H) : x->size);
   const double most = fmax (missed, RESOLUTION_SEEN * fmax (fabs (y1 - y0), fabs (y2 - y1)));
-  return resolution_is_near (r, x, 0, m, y0, y1, most, RESOLUTION_DEPTH, 0) &&
-         resolution_is_near (r, x, m, H, y1, y2, most, RESOLUTION_DEPTH, 0);
+  return resolution_is_near (r, x, 0, m, y0, y1, most, RESOLUTION_DEPTH) &&
+         resolution_is_near (r, x, m, H, y1, y2, most, RESOLUTION_DEPTH);
 }
 
 /* The time from r->t on that is resolved, halved from `longest` to `least`; 0: not even that is. */
@@ -173,7 +185,7 @@ static double resolution_size (pw_run *r, const pw_source *source) {
   for (int i = 1; i <= source->reads; i++) d->lo[i] = -DBL_MAX, d->hi[i] = DBL_MAX;
   pw_signal_bounds (source, d->lo, d->hi, bounds);
   const double size = fmax (fabs (bounds[0]), fabs (bounds[1]));
-  return size > 0 && size < INFINITY ? size : 1;
+  return size > 0 && size < 1e100 ? size : 1;
 }
 
 /* The longest step that a harmonic signal permits: half a period, if its effect in it exceeds the tolerance. */

@@ -95,6 +95,7 @@ static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
   r->jumped = 1;
   r->predicted = 0;
+  pw_run_fix_sides (r);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include "events.h"
 #include "resolution.h"
+#include "sides.h"
 #include "methods.h"
 #include "rank.h"
 #include "method.h"
@@ -233,14 +234,18 @@ static int (*run_step (const pw_run *r)) (pw_run *r, double t_end, pw_error *err
 
 /* A step in which signals, events and conditions are watched. */
 static int run_watched_advance (pw_run *r, double t_end, pw_error *error) {
-  if (r->resolution) t_end = fmin (t_end, pw_resolution_end (r));
-  return run_step (r) (r, t_end, error);
+  const double t0 = r->t;
+  int status = r->sides ? pw_sides_begin (r, error) : PW_OK;
+  if (r->resolution && status == PW_OK) t_end = fmin (t_end, pw_resolution_end (r));
+  if (status == PW_OK) status = run_step (r) (r, t_end, error);
+  return r->sides && status == PW_OK ? pw_sides_follow (r, t0, error) : status;
 }
 
 static int run_watch_steps (pw_run *r, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  const int status = pw_resolution_open (r, error);
-  if (r->resolution) r->advance = run_watched_advance;
+  int status = pw_resolution_open (r, error);
+  if (status == PW_OK) status = pw_sides_open (r, error);
+  if (r->resolution || r->sides) r->advance = run_watched_advance;
   return status;
 }
 
@@ -387,6 +392,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   r->w->t_signal = NAN;
   restart_exchange (r, q, v);
   r->predicted = 0;
+  pw_run_free_sides (r);
   status = restart_continue (r, &after, error);
   if (status == PW_OK) {
     r->moved_from = r->t;
@@ -488,6 +494,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   checkpoint_statistics (&r->statistics, a);
   pw_rank_serialise (r, a);
   pw_events_serialise (r, a);
+  pw_run_serialise_sides (r, a);
 }
 
 /* Continues from the run's state, which was just saved or loaded, and loads the method's own data, if any, from a. */

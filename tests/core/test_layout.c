@@ -15,8 +15,8 @@
   static_assert (constant == value, #constant " has changed: see the top of this file")
 
 LAYOUT (pw_error, 504);
-LAYOUT (pw_function, 64);
-LAYOUT (pw_signal, 72);
+LAYOUT (pw_function, 72);
+LAYOUT (pw_signal, 80);
 LAYOUT (pw_signal_text, 32);
 LAYOUT (pw_body, 80);
 LAYOUT (pw_parameter, 48);
@@ -40,6 +40,7 @@ LAYOUT_AT (pw_function, open, 32);
 LAYOUT_AT (pw_function, close, 40);
 LAYOUT_AT (pw_function, text, 48);
 LAYOUT_AT (pw_function, range, 56);
+LAYOUT_AT (pw_function, sides, 64);
 LAYOUT_AT (pw_body, mass, 8);
 LAYOUT_AT (pw_body, inertia, 16);
 LAYOUT_AT (pw_body, start, 24);

@@ -110,7 +110,7 @@ TEST (bumps) {
     }
     pw_statistics statistics;
     double v;
-    narrow_run (s, "rk4+none", &(pw_settings){ .span = 3, .step = 0.02 }, 3, &v, &statistics);
+    narrow_run (s, "rk4+none", &(pw_settings){ .span = 3, .step = 0.1 }, 3, &v, &statistics);
     assert_true (statistics.unresolved > 0);
     pw_system_free (s);
   }

@@ -158,7 +158,7 @@ pw_settings = _structure(
     stop=c.c_void_p, stop_context=c.c_void_p, max_steps=c.c_long, initial=c.c_void_p, initials=c.c_int, specialised=c.c_void_p)
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
-    restarts=c.c_long, specialised=c.c_long, unresolved=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
+    restarts=c.c_long, specialised=c.c_long, conditions=c.c_long, unresolved=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
 pw_event = _structure("pw_event", t=c.c_double, impulse=c.c_double, row=c.c_int, to=c.c_int, impact=c.c_int, **{"from": c.c_int})
 pw_crossing = _structure("pw_crossing", value=c.c_void_p, context=c.c_void_p)
 pw_initial_report = _structure(

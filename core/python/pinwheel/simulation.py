@@ -251,7 +251,8 @@ class Simulation:
     @staticmethod
     def _statistics(run):
         s = lib.core.pw_run_statistics(run).contents
-        counts = ("steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "specialised", "unresolved", "g", "jv")
+        counts = ("steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "specialised", "conditions",
+                  "unresolved", "g", "jv")
         return {**{name: getattr(s, name) for name in counts}, "residual.position": s.position, "residual.velocity": s.velocity}
 
     def _columns(self):

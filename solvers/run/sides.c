@@ -1,0 +1,169 @@
+/* Conditions on states in signals: comparisons, abs, floor and others (evaluation.c).
+ *
+ * In a step their sides are fixed, so that accelerations are smooth and the method keeps its order, also where its
+ * stages lie beyond a condition.  After the step the first time at which one is beyond its side is located in the dense
+ * output.  The state there becomes the state reached, the sides are fixed anew, and the method restarts.  Where
+ * accelerations on both sides lead back to the condition, there is no motion but along it (Filippov 1988, Differential
+ * Equations with Discontinuous Righthand Sides): the run stops. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "crossing.h"
+#include "events.h"
+#include "sides.h"
+#include "util.h"
+
+#define SIDES_SLIDE 1e-9      /* times [T] after which a condition that has changed returns without having left */
+#define SIDES_DIFFERENCE 1e-6 /* of the step, for the rates of conditions */
+
+/* ---- Values ---- */
+
+/* How far a state is beyond the sides. */
+static void sides_evaluate (pw_run *r, double t, const double *q, const double *v, double *beyond) {
+  for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
+    double *state = r->sides->read;
+    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL) continue;
+    for (int i = 0; i < x->reads; i++) {
+      const int j = x->state[i];
+      state[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];
+    }
+    beyond += x->signal.function.sides (x->signal.function.context, t, state, beyond);
+  }
+}
+
+/* The same at the state reached, and the rates [1/s] there. */
+static void sides_evaluate_rates (pw_run *r, double h, double *beyond, double *rate) {
+  const double s = SIDES_DIFFERENCE * h, t = pw_before_breakpoint (r, r->t);
+  double *q = r->scratch, *v = q + r->s->coords + 3;
+  sides_evaluate (r, t, r->q, r->v, beyond);
+  for (int j = 0; j < r->s->coords; j++) q[j] = r->q[j] + s * r->v[j], v[j] = r->v[j] + s * r->a[j];
+  sides_evaluate (r, t + s, q, v, rate);
+  for (int i = 0; i < r->sides->count; i++) rate[i] = (rate[i] - beyond[i]) / s;
+}
+
+/* pw_crossing_search.at.  Keeps the first sample that is beyond a side: another one at its time may differ by the
+ * tolerance, since methods interpolate between samples (rk.c). */
+static int sides_at (void *context, double t, double *value, pw_error *error) {
+  pw_run *r = context;
+  pw_sides *x = r->sides;
+  const pw_statistics statistics = r->statistics;
+  const int near_singular = r->near_singular, status = r->method->at (r, t, error);
+  r->statistics = statistics, r->near_singular = near_singular;
+  if (status != PW_OK) return status;
+  sides_evaluate (r, t, r->q_at, r->v_at, value);
+  int beyond = 0;
+  for (int i = 0; i < x->count; i++) beyond |= value[i] > 0;
+  if (!beyond || !(t < x->found.t)) return PW_OK;
+  x->found.t = t, x->found.projected = r->projected_at;
+  memcpy (x->found.q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
+  memcpy (x->found.ledger, r->ledger_at, (size_t)r->entries * sizeof *r->ledger);
+  memcpy (x->now, value, (size_t)x->count * sizeof *value);
+  return PW_OK;
+}
+
+/* ---- Steps ---- */
+
+/* The condition i: its signal. */
+static const pw_source *sides_source (const pw_run *r, int i) {
+  const pw_source *x = r->w->source;
+  for (;; x++) {
+    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL) continue;
+    i -= x->signal.function.sides (x->signal.function.context, 0, NULL, r->sides->now);
+    if (i < 0) return x;
+  }
+}
+
+static int sides_fail (pw_run *r, int i, pw_error *error) {
+  char signal[PW_NAME_BYTES];
+  r->w->failed = sides_source (r, i);
+  pw_failed_signal (r->w, signal, sizeof signal);
+  r->w->failed = NULL;
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: %s: on both sides of a condition it leads back to it, so that the motion slides along it "
+      "in infinitely many steps; use friction or sliding-friction, which stick, or a smooth function, such "
+      "as tanh (x/0.001) in place of sign (x)",
+      r->t, signal);
+}
+
+int pw_sides_begin (pw_run *r, pw_error *error) {
+  pw_sides *x = r->sides;
+  const double T = r->w->scale.time;
+  if (!x->fixed) pw_run_fix_sides (r);
+  sides_evaluate_rates (r, x->h > 0 ? x->h : 1e-3 * T, x->start, x->start_rate);
+  for (int i = 0; i < x->count; i++) {
+    if (x->changed[i] && x->start_rate[i] > 0 && -x->start[i] < SIDES_SLIDE * T * x->start_rate[i])
+      return sides_fail (r, i, error);
+    x->changed[i] = 0;
+  }
+  return PW_OK;
+}
+
+/* 1 if no condition comes near the other side: by four times the deviation of the cubic from its chord. */
+static int sides_far (const pw_sides *x, double h) {
+  for (int i = 0; i < x->count; i++) {
+    const double chord = x->end[i] - x->start[i];
+    const double bend = fabs (h * x->start_rate[i] - chord) + fabs (h * x->end_rate[i] - chord);
+    if (!(fmax (x->start[i], x->end[i]) + bend < 0) && x->start[i] > -INFINITY) return 0;
+  }
+  return 1;
+}
+
+/* Makes the sample found the state reached, or leaves the end of the step if that is the first one beyond a side. */
+static void sides_stop (pw_run *r) {
+  pw_sides *x = r->sides;
+  const double *beyond = x->found.t < r->t ? x->now : x->end;
+  for (int i = 0; i < x->count; i++) x->changed[i] = beyond[i] > 0;
+  r->interrupted = 1;
+  r->statistics.conditions++;
+  if (!(x->found.t < r->t)) return;
+  memcpy (r->q, x->found.q, pw_state_length (r->s) * sizeof *r->q);
+  memcpy (r->ledger, x->found.ledger, (size_t)r->entries * sizeof *r->ledger);
+  r->projected = x->found.projected, r->t = x->found.t;
+  if (r->events && !r->method->locates_no_events) pw_events_forget (r);
+}
+
+int pw_sides_follow (pw_run *r, double t0, pw_error *error) {
+  pw_sides *x = r->sides;
+  pw_crossing_search search = { .count = x->count,
+                                .at = sides_at,
+                                .context = r,
+                                .memory = x->memory,
+                                .width = 4 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time),
+                                .error = error };
+  x->h = r->t - t0;
+  sides_evaluate_rates (r, x->h, x->end, x->end_rate);
+  if (sides_far (x, x->h)) return PW_OK;
+  x->found.t = INFINITY;
+  const double root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
+  if (search.status != PW_OK) return search.status;
+  if (!isnan (root)) sides_stop (r);
+  pw_forget_residuals (r);
+  if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  if (r->t == x->found.t) pw_ledger_rates (r, r->lambda, r->rate);
+  return PW_OK;
+}
+
+/* ---- Opening ---- */
+
+int pw_sides_open (pw_run *r, pw_error *error) {
+  int count = 0, reads = 0;
+  for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
+    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL || x->reads == 0) continue;
+    count += x->signal.function.sides (x->signal.function.context, 0, NULL, NULL);
+    reads = x->reads > reads ? x->reads : reads;
+  }
+  if (count == 0) return PW_OK;
+  const size_t n = (size_t)count, numbers = (PW_CROSSING_DEPTH + 7) * n +
+                                            (size_t)(reads + 2 * r->s->coords + r->entries) + pw_state_length (r->s);
+  pw_sides *x = r->sides = pw_arena_alloc (&r->arena, sizeof *x);
+  double *memory = pw_arena_alloc (&r->arena, numbers * sizeof *memory);
+  unsigned char *changed = pw_arena_alloc (&r->arena, n);
+  if (x == NULL || memory == NULL || changed == NULL) return r->sides = NULL, pw_fail_memory (r->s, error);
+  *x = (pw_sides){ .count = count, .changed = changed, .start = memory };
+  x->end = x->start + n, x->start_rate = x->end + n, x->end_rate = x->start_rate + n, x->now = x->end_rate + n;
+  x->memory = x->now + n, x->read = x->memory + (PW_CROSSING_DEPTH + 2) * n, x->state = x->read + reads;
+  x->found.q = x->state + 2 * r->s->coords, x->found.ledger = x->found.q + pw_state_length (r->s);
+  return PW_OK;
+}
