@@ -161,7 +161,7 @@ static void list_kind (const void *entry) {
   puts ("    fields");
   for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)
-    printf ("    a signal is a number, an expression of t%s, or a form shown by `pinwheel list signals`\n",
+    printf ("    a signal is a number, an expression of t%s, or a form of `pinwheel list signals`\n",
             pw_kind_signals_force (k)      ? " and of states such as BODY.phi"
             : pw_kind_signals_feedback (k) ? ", of positions and first-order states"
                                            : "");

@@ -132,8 +132,8 @@ TEST (bad) {
       "--input x.value is the signal of a constraint; only signals of forces can be inputs" },
     { "ezyroller --at -1", "--at -1: expected a number >= 0" },
     { "ezyroller --at soon", "--at: \"soon\" is not a number" },
-    { "pendulum -o ''", "-o : expected a NAME, for NAME.json, NAME.csv and NAME.npz" },
-    { "pendulum -o ./", "-o ./: expected a NAME, for NAME.json, NAME.csv and NAME.npz" },
+    { "pendulum -o ''", "-o : expected the name of a file, .csv, .npz or .json" },
+    { "pendulum -o ./", "-o ./: expected the name of a file, .csv, .npz or .json" },
     { "peaucellier -o @/none", "peaucellier has no degrees of freedom: there is nothing to linearise" },
     { "chain --set n=200", "chain has 600 coordinates; linearise takes at most 400" },
   };

@@ -312,13 +312,13 @@ TEST (list) {
   assert_null (strstr (cli_out, "required"));
   cli_good ("pinwheel list kinds rolling-wheel drive");
   static const char *const items[] = { "- {rolling-wheel: NAME, body: BODY, at: [X, Y], radius: NUMBER}",
-                                       "  radius   number [m]       required (> 0)  radius of the wheel",
-                                       "  inertia  number [kg m^2]  0 (>= 0)        moment of inertia about the axle",
+                                       "  radius        number [m]       required (> 0)  radius of the wheel",
+                                       "  inertia       number [kg m^2]  0 (>= 0)        moment of inertia",
                                        "states such as BODY.phi",
                                        "  spin  rad  spin_rate  ",
                                        "- {drive: NAME, body: [BODY, BODY], what: x, value: SIGNAL}",
                                        "required: x | y | angle",
-                                       "a number, an expression of t, or a form of" };
+                                       "a signal is a number, an expression of t, or a form of" };
   for (size_t i = 0; i < sizeof items / sizeof *items; i++) assert_non_null (strstr (cli_out, items[i]));
 }
 

@@ -52,7 +52,8 @@ TEST (push) {
   }
 }
 
-/* An expression in place of a built-in signal: the same motion but for round-off. */
+/* An expression in place of a built-in signal: the same motion but for round-off, and adaptive steps, since the bounds
+ * of an expression, by which they are limited, are wider than those of a form. */
 TEST (built_in) {
   static const char drive[] = "  - {drive: D, body: [a, ground], what: angle, value: @}\n"
                               "  - {pin: P, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n";
@@ -79,12 +80,15 @@ TEST (built_in) {
       double q[2][6], v[2][6];
       for (int k = 0; k < 2; k++) {
         gallery_scene x = scene_of (pair[i].elements, k ? pair[i].expression : pair[i].form);
-        runs_state (x.system, method[m], &(pw_settings){ .step = 0.05, .rtol = 1e-7 }, 3, q[k], v[k], NULL);
+        runs_state (x.system, method[m], &(pw_settings){ .step = 0.05, .rtol = 1e-10 }, 3, q[k], v[k], NULL);
         gallery_close (&x);
       }
       for (int j = 0; j < 6; j++) {
-        check_close (pair[i].expression, q[1][j], q[0][j], 1e-11, "round-off, which adaptive steps carry on");
-        check_close (pair[i].expression, v[1][j], v[0][j], 1e-11, "round-off, which adaptive steps carry on");
+        const double bound = m % 4 == 0 ? 1e-11 : 1e-7; /* the first and the last have fixed steps */
+        check_close (pair[i].expression, q[1][j], q[0][j], bound,
+                     "round-off; 1000 rtol, as of multistep methods, with adaptive steps");
+        check_close (pair[i].expression, v[1][j], v[0][j], bound,
+                     "round-off; 1000 rtol, as of multistep methods, with adaptive steps");
       }
     }
 }
@@ -104,7 +108,7 @@ TEST (gradient) {
   check_close ("by phi", gradient[0], t * cos (phi) * e, 8 * CHECK_EPS, "round-off");
   check_close ("by omega", gradient[1], -2 * omega * t * sin (phi) * e, 8 * CHECK_EPS, "round-off");
   check_close ("by x", gradient[2], -2, 0, "exact");
-  assert_string_equal (s->function.text->jump, "b.omega > 0");
+  assert_null (s->function.text->jump); /* b.omega > 0: located in each run */
   s->function.close (own);
   gallery_close (&x);
 }

@@ -89,7 +89,7 @@ TEST (compare) {
                                        "  block.vx: -a*(w + d^2/w)*exp(-d*t)*sin(w*t)\n",
                                        truth_text));
   cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --repeats 1 --step-ladder 0.1:0.02 --rtol-ladder "
-            "1e-4:1e-5 -o @/whole");
+            "1e-4:1e-5 --plots @/whole");
   cli_shows ("errors are measured against the exact solution of the model\n");
   assert_null (strstr (cli_out, "contains"));
   cli_good ("tail -n +2 @/whole/compare.csv | cut -d, -f8,12 | sort -u");

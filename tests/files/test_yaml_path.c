@@ -99,7 +99,7 @@ TEST (breaks) {
     { "eight.offset (a.x, a.y)", INFINITY, "eight.offset (a.x, a.y)" },
     { "2*eight.s (t, 0, 3)", INFINITY, "eight.s (t, 0, 3)" },
     { "eight.s (t, 0, a.x)", INFINITY, "" },
-    { "eight.s (a.x, a.y) + sign (a.y)", INFINITY, "sign (a.y)" },
+    { "eight.s (a.x, a.y) + sign (a.y)", INFINITY, "eight.s (a.x, a.y)" },
     { "zig.offset (a.x, a.y, t)", INFINITY, "zig.offset (a.x, a.y, t)" },
     { "zig.heading (a.x)", INFINITY, "zig.heading (a.x)" },
     { "zig.x (a.x)", INFINITY, "" },

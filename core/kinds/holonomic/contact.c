@@ -84,7 +84,7 @@ static const pw_field touch_fields[] = {
 
 const pw_kind pw_kind_contact = {
   .name = "contact",
-  .about = "a point or disc of one body does not enter the half plane, or disc, of another, on which it bounces",
+  .about = "a point or disc of one body does not enter the half plane or disc of another, where it bounces",
   TYPE (touch, pw_contact, touch),
   .bodies = 2,
   .rows = 1,
