@@ -438,7 +438,7 @@ typedef struct {
 } pw_rope;
 
 /* Contact: a point or disc of body 1 stays on the left side of a line of body 2, or outside of a disc of body 2.  One
- * holonomic constraint equation. */
+ * holonomic constraint equation, and with friction a nonholonomic one. */
 typedef struct {
   const char *name, *body[2]; /* what touches, and what it touches, or "ground" for one of them */
   double at[2][2];            /* the point or centre; a point of the line, or the centre, in each body's frame [m] */
@@ -446,6 +446,8 @@ typedef struct {
   double radius;              /* of the disc of body 1 [m]; 0: a point */
   double other_radius;        /* of the disc of body 2 [m]; 0: a line */
   double restitution;         /* normal velocity after an impact over that before it, 0 to 1 */
+  double mu;                  /* largest friction over normal force; 0: no friction */
+  double mu_sliding;          /* the same while it slides, at most mu; 0: mu */
 } pw_contact;
 
 /* Freewheel: body 1 does not turn more slowly than body 2.  One nonholonomic constraint equation. */
@@ -733,6 +735,9 @@ typedef struct {
                          * that it holds, unless they are specified */
   const pw_signal *signal[2]; /* of opposite limits that vary: their magnitude while the equation holds, and while it
                                * does not, in the definition (pw_field.limit), in place of the numbers above; or NULL */
+  /* 1: the limits are multiples of the magnitude of the multiplier of equation `partner`, as of Coulomb friction. */
+  int relative;
+  int partner; /* set by the core: the first row of the element that this one accompanies; of that row, this one */
 } pw_bounds;
 
 /* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations
@@ -795,6 +800,10 @@ struct pw_kind {
   /* The type that stands for this one where is_exact (definition) is not 0; with the same definition and fields. */
   const struct pw_kind *exact;
   int (*is_exact) (const void *definition);
+  /* The type of an element that accompanies one of this type where has_companion (definition) is not 0, such as the
+   * friction of a contact; with the same name, definition and fields, and relative limits (pw_bounds). */
+  const struct pw_kind *companion;
+  int (*has_companion) (const void *definition);
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */
@@ -834,6 +843,9 @@ PW_KINDS
 extern const pw_kind pw_kind_dry_friction;
 extern const pw_kind pw_kind_slipping_wheel;
 extern const pw_kind pw_kind_dry_sliding_friction;
+
+/* What accompanies a contact with friction (pw_kind.companion). */
+extern const pw_kind pw_kind_contact_friction;
 
 /* The built-in element types; ends with NULL. */
 extern const pw_kind *const pw_kinds[];

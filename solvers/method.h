@@ -107,6 +107,13 @@ void pw_run_serialise_sides (struct pw_run *r, pw_archive *a);
 enum { PW_MAX_OPTIONS = 12 };
 enum { PW_FORCES_AT_LIMITS = 2 }; /* pw_run.forces: of equations that are not enforced, too */
 
+/* Equations that are not enforced and whose multipliers are multiples of others: friction of contacts that slide,
+ * lambda[row] = ratio lambda[on]. */
+typedef struct {
+  int row, on;
+  double ratio;
+} pw_coupling;
+
 struct pw_scene_step;
 
 /* Derivatives of the given multiplier of an equation. */
@@ -135,11 +142,15 @@ struct pw_run {
   struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
   const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
   double *reaction;              /* rows: minus the multipliers of those, else 0; NULL without events */
-  void (*update_given) (
-      struct pw_run *r);  /* sets these, and their derivatives, where J is evaluated; NULL: constants */
+  /* Sets these, and their derivatives, where J is evaluated; NULL: constants. */
+  void (*update_given) (struct pw_run *r);
   struct pw_given *given; /* rows: the derivatives; NULL without events */
-  char *events_memory;    /* of r->events */
-  pw_event *event;        /* events so far: `event_count` of them */
+  pw_coupling *coupling;  /* couplings: those that slide now */
+  int couplings;
+  double *coupling_memory; /* 2 (coords + 3) + rows, and couplings (couplings + 1) */
+  int coupling_lost;       /* 1: the last evaluation had no unique solution, see dynamics.c */
+  char *events_memory;     /* of r->events */
+  pw_event *event;         /* events so far: `event_count` of them */
   long event_count;
   size_t event_room;
   pw_sides *sides;                  /* of conditions in signals; NULL: there are none */
@@ -217,6 +228,12 @@ struct pw_run {
 
 /* ---- Equations that are not enforced (events.h): they have given multipliers ---- */
 
+/* Sets the multipliers that are multiples of others. */
+static inline void pw_couple (pw_run *r, const double *lambda) {
+  for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++)
+    r->reaction[c->row] = -c->ratio * lambda[c->on];
+}
+
 /* f (coords + 3) += their forces, with the J last evaluated. */
 static inline void pw_add_given_forces (struct pw_run *r, double *f) {
   if (r->update_given) r->update_given (r);
@@ -228,6 +245,8 @@ static inline void pw_fill_given (struct pw_run *r, double *lambda) {
   if (r->update_given) r->update_given (r);
   for (int i = 0; i < r->s->rows; i++)
     if (!r->enforced[i]) lambda[i] = -r->reaction[i];
+  for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++)
+    lambda[c->row] = c->ratio * lambda[c->on];
 }
 
 /* ---- Tolerances ---- */

@@ -137,7 +137,8 @@ static int find_column (pw_reader *r, const char *name, pw_column *c) {
   const pw_kind *type = kind < 0 ? NULL : pw_kinds[kind];
   if (type == NULL || type->each_body != (body != NULL)) return 0;
   if (body && pw_names_find (&r->bodies, body) < 0) return 0;
-  return pw_kind_find_column (type, last + 1, c) || (type->exact && pw_kind_find_column (type->exact, last + 1, c));
+  return pw_kind_find_column (type, last + 1, c) || (type->exact && pw_kind_find_column (type->exact, last + 1, c)) ||
+         (type->companion && pw_kind_find_column (type->companion, last + 1, c));
 }
 
 /* The place of a wheel or marker that precedes, "rear.x", as an expression of states; NULL: the name is another one, or

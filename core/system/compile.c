@@ -70,13 +70,18 @@ static int compile_names (compilation *job) {
   return PW_OK;
 }
 
+/* 1 if an element of the model, or its companion, is of this type. */
+static int compile_has_kind (const pw_element *from, const pw_kind *kind) {
+  return from->kind == kind || (from->kind->companion == kind && from->kind->has_companion (from->definition));
+}
+
 /* Lists the elements of a batch, in the model from the first one on; those of an each_body type once for every body
  * with mass. */
 static int compile_list (compilation *job, const pw_element *first, pw_element_batch *k) {
   const pw_model *m = job->m;
   int each = k->kind->each_body;
   for (const pw_element *from = first; from < m->element + m->elements; from++)
-    for (int b = each ? 0 : -1; from->kind == k->kind && b < (each ? m->bodies : 0); b++) {
+    for (int b = each ? 0 : -1; compile_has_kind (from, k->kind) && b < (each ? m->bodies : 0); b++) {
       if (b >= 0 && !(m->body[b].mass > 0)) continue;
       if (job->listed == COMPILE_MOST) return compile_too_large (job);
       if (pw_grow (&job->list, (size_t)job->listed, &job->list_room, sizeof *job->list) != PW_OK)
@@ -96,14 +101,16 @@ static int compile_types (compilation *job) {
   if (pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK)
     return compile_no_memory (job); /* for no element, too */
   for (int l = 0; l < 4; l++)
-    for (int i = 0; i < m->elements; i++) {
-      const pw_kind *kind = m->element[i].kind;
+    for (int i = 0; i < 2 * m->elements; i++) { /* each with its companion */
+      const pw_element *from = &m->element[i / 2];
+      const pw_kind *kind = i % 2 ? from->kind->companion : from->kind;
       int k = 0;
+      if (kind == NULL || !compile_has_kind (from, kind)) continue;
       while (k < s->batches && s->batch[k].kind != kind) k++;
       if (kind->level != order[l] || k < s->batches || (kind->first_order && l < 3)) continue;
       if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
       s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
-      int status = compile_list (job, &m->element[i], &s->batch[k]);
+      int status = compile_list (job, from, &s->batch[k]);
       if (status != PW_OK) return status;
     }
   return PW_OK;
@@ -189,9 +196,8 @@ static int compile_bodies (const compilation *job) {
 }
 
 /* Prepares an element, and checks that `prepare` stays within its size; what follows it in memory is not used yet. */
-static int compile_prepare (const compilation *job, const pw_element *from, const pw_body *const *bodies,
-                            pw_internal *internal, unsigned char *element) {
-  const pw_kind *kind = from->kind;
+static int compile_prepare (const compilation *job, const pw_kind *kind, const pw_element *from,
+                            const pw_body *const *bodies, pw_internal *internal, unsigned char *element) {
   pw_error cause = { 0 };
   memset (element, 0, kind->element);
   memset (element + kind->element, COMPILE_MARK, COMPILE_GUARD);
@@ -226,7 +232,7 @@ static int compile_element (const compilation *job, const pw_element_batch *k, i
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
-  int status = compile_prepare (job, from->element, bodies, internal, element);
+  int status = compile_prepare (job, kind, from->element, bodies, internal, element);
   if (status != PW_OK) return status;
   for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
     const char *expected = pw_domain_check (PW_NONNEGATIVE, internal[n].mass);
@@ -468,6 +474,20 @@ static int compile_find_limit (const pw_system *s, int batch, int element, const
   return -1;
 }
 
+/* Sets pw_bounds.partner of the elements of a batch, companions, and of those that they accompany: both are in the
+ * order of the model. */
+static void compile_partners (pw_system *s, const pw_element_batch *k) {
+  const pw_element_batch *of = s->batch;
+  while (of < s->batch + s->constraints && of->kind->companion != k->kind) of++;
+  for (int e = 0, first = 0; e < k->b.count && of < s->batch + s->constraints; e++, first++) {
+    const int row = k->row + e * k->kind->rows;
+    while (first < of->b.count && strcmp (of->name[first], k->name[e]) != 0) first++;
+    if (first == of->b.count) return;
+    s->limit[row].partner = of->row + first * of->kind->rows;
+    s->limit[s->limit[row].partner].partner = row;
+  }
+}
+
 /* The limits of all multipliers, if there are any. */
 static int compile_limits (const compilation *job) {
   pw_system *s = job->s;
@@ -482,11 +502,13 @@ static int compile_limits (const compilation *job) {
       const void *definition = from->element->definition;
       const int first = s->batch[b].row + e * kind->rows;
       if (kind->limits) kind->limits (definition, limit + first);
-      for (int i = first; i < first + kind->rows; i++)
+      for (int i = first; i < first + kind->rows; i++) {
+        limit[i].partner = -1;
         for (int n = 0; n < 2; n++) {
           s->limit_source[i][n] = compile_find_limit (s, b, e, definition, limit[i].signal[n]);
           limit[i].signal[n] = NULL;
         }
+      }
     }
   s->limit = limit;
   for (int i = 0; i < s->rows; i++) {
@@ -494,13 +516,18 @@ static int compile_limits (const compilation *job) {
     if (isnan (limit[i].sliding[0])) limit[i].sliding[0] = limit[i].least;
     if (isnan (limit[i].sliding[1])) limit[i].sliding[1] = limit[i].most;
   }
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++) compile_partners (s, k);
+  for (int i = 0; i < s->rows; i++) limit[i].relative &= limit[i].partner >= 0;
   if (s->limited == 0) s->limit = NULL;
   return PW_OK;
 }
 
-/* 1 if an element may dissipate energy: of constraints, if a multiplier has a limit. */
+/* 1 if an element may dissipate energy: of constraints, if a multiplier has a limit.  A companion has the losses of
+ * both. */
 static int compile_has_loss (const pw_system *s, const pw_element_batch *k, int element) {
   if (k->kind->limits == NULL) return k->kind->loss != NULL;
+  const pw_bounds *first = s->limit ? &s->limit[k->row + element * k->kind->rows] : NULL;
+  if (first && first->partner >= 0 && !first->relative) return 0;
   for (int i = 0; i < k->kind->rows; i++)
     if (pw_is_limited (s, k->row + element * k->kind->rows + i)) return 1;
   return 0;

@@ -19,7 +19,7 @@ const pw_kind *const pw_kinds[] = {
 
 int pw_kind_is_built_in (const pw_kind *kind) {
   for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if (*k == kind || (*k)->exact == kind) return 1;
+    if (*k == kind || (*k)->exact == kind || (*k)->companion == kind) return 1;
   return 0;
 }
 
@@ -109,6 +109,8 @@ static const char *fault_functions (const pw_kind *kind) {
   if (kind->limits && kind->rows == 0) return "limits, but no constraint equations";
   if (kind->exact && (kind->is_exact == NULL || kind->exact->definition != kind->definition))
     return "an exact type, but no is_exact, or definitions of different sizes";
+  if (kind->companion && (kind->has_companion == NULL || kind->companion->definition != kind->definition))
+    return "a companion, but no has_companion, or definitions of different sizes";
   return "";
 }
 

@@ -379,6 +379,7 @@ const pw_bounds *pw_system_limits (const pw_system *s, int row) {
 
 const char *pw_system_mode_name (const pw_system *s, int row, int mode) {
   const pw_bounds *limit = s->limit ? &s->limit[row] : NULL;
+  if (limit && limit->relative && mode == 0) return "sticks";
   if (mode == 0) return "holds";
   return limit && limit->circle             ? "slides"
          : limit && pw_is_one_sided (limit) ? "free"

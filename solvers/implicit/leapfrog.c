@@ -230,8 +230,13 @@ static int kick_solve (pw_run *r, double h, double t1) {
 
 /* ---- Opening ---- */
 
-/* The kick has fixed constraints: their signals must not depend on the states that it changes. */
+/* The kick has fixed constraints: their signals must not depend on the states that it changes.  Its impulses are those
+ * of the symmetric equations, without friction that depends on them. */
 static int leapfrog_check_feedback (const pw_run *r, pw_error *error) {
+  for (int i = 0; r->s->limit && i < r->s->rows; i++)
+    if (r->s->limit[i].relative)
+      return pw_fail (error, PW_INPUT, "leapfrog: the friction of %s depends on a reaction; use galpha or rk4",
+                      PW_NAME (pw_system_row_name, r->s, i));
   for (const pw_source *source = r->s->source, *end = source + r->s->sources; source < end; source++)
     for (int i = 0; source->feedback && i < source->reads; i++)
       if (source->state[i] >= r->s->coords)

@@ -130,6 +130,21 @@ static void tangent_put_J (pw_tangent *x, tangent_part part, const pw_placement 
     tangent_put (x, k, part, k->J, put);
 }
 
+/* Adds to J^T, in the columns of the equations on which they depend, the rows of multipliers that are multiples. */
+static void tangent_put_couplings (pw_tangent *x, const pw_placement *put) {
+  const pw_run *r = x->run;
+  for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++) {
+    const pw_element_batch *k = r->w->batch;
+    while (c->row >= k->row + k->b.count * k->kind->rows) k++;
+    const int e = (c->row - k->row) / k->kind->rows;
+    const double *J = k->J + (c->row - k->row) * k->b.cols;
+    for (int i = 0; i < k->b.cols; i++)
+      if (pw_global (k, e, i) < r->s->coords)
+        pw_scatter_add (&x->scatter, put->row + pw_global (k, e, i), put->col + x->row_index[c->on],
+                        x->scatter.recording ? 0 : put->factor * c->ratio * J[i]);
+  }
+}
+
 void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put) {
   tangent_put_J (x, TANGENT_JT, put);
 }
@@ -309,6 +324,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   put.factor = put.factor_nonholonomic = to->lambda_factor;
   put.col = to->lambda;
   pw_tangent_add_JT (x, &put);
+  tangent_put_couplings (x, &put);
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 J (holonomic); 2 alpha J - gamma_v; J */
@@ -383,6 +399,7 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
   for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
   dae_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
   pw_evaluate_force (r->w, x->force);
+  if (r->couplings > 0) pw_couple (r, x->tangent.lambda);
   if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, x->force);
   for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);

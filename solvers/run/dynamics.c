@@ -237,13 +237,74 @@ void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
   if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, gamma);
 }
 
+/* Solves K x = y (n x n) by elimination with partial pivoting; returns 0 unless the determinant is positive. */
+static int dynamics_eliminate (double *K, double *y, int n) {
+  int sign = 1;
+  for (int i = 0; i < n; i++) {
+    int best = i;
+    for (int k = i + 1; k < n; k++)
+      if (fabs (K[k * n + i]) > fabs (K[best * n + i])) best = k;
+    for (int j = 0; j < n && best != i; j++) {
+      const double swap = K[i * n + j];
+      K[i * n + j] = K[best * n + j], K[best * n + j] = swap;
+    }
+    const double swap = y[i];
+    y[i] = y[best], y[best] = swap;
+    sign *= (best == i ? 1 : -1) * (K[i * n + i] > 0 ? 1 : -1);
+    for (int k = i + 1; k < n; k++) {
+      const double factor = K[k * n + i] / K[i * n + i];
+      for (int j = i; j < n; j++) K[k * n + j] -= factor * K[i * n + j];
+      y[k] -= factor * y[i];
+    }
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    for (int j = i + 1; j < n; j++) y[i] -= K[i * n + j] * y[j];
+    y[i] /= K[i * n + i];
+  }
+  return sign > 0;
+}
+
+/* Friction x of contacts that slide, multiples c of their normal multipliers, which are linear functions of it:
+ *
+ *   x = c lambda_N = c (lambda_N0 + L x),   lambda_N0: without friction;   columns of L: of unit friction alone
+ *
+ * The forces f without that friction, gamma: as of the equations.  The determinant of 1 - c L is that of the
+ * non-symmetric system of equations over that of the symmetric one.  Where it is not positive, motions are not unique
+ * (Painleve 1895; Genot & Brogliato 1999, European Journal of Mechanics A 18, 653-677). */
+__attribute__ ((noinline)) static void dynamics_couple (pw_run *r, const double *f, const double *gamma) {
+  const int rows = r->s->rows, m = r->couplings;
+  const size_t n = (size_t)r->s->coords + 3;
+  double *force = r->coupling_memory, *a = force + n, *lambda = a + n, *K = lambda + rows, *x = K + m * m;
+  (void)pw_saddle_factor (r->saddle);
+  for (const pw_coupling *c = r->coupling; c < r->coupling + m; c++) r->reaction[c->row] = 0;
+  memcpy (force, f, n * sizeof *force);
+  pw_add_given_forces (r, force);
+  memcpy (lambda, gamma, (size_t)rows * sizeof *lambda);
+  pw_saddle_solve (r->saddle, force, lambda, a, lambda);
+  for (int k = 0; k < m; k++) x[k] = r->coupling[k].ratio * lambda[r->coupling[k].on];
+  for (int j = 0; j < m; j++) {
+    memset (force, 0, n * sizeof *force);
+    memset (lambda, 0, (size_t)rows * sizeof *lambda);
+    lambda[r->coupling[j].row] = -1;
+    pw_add_JT (r->w, lambda, force);
+    memset (lambda, 0, (size_t)rows * sizeof *lambda);
+    pw_saddle_solve (r->saddle, force, lambda, a, lambda);
+    for (int k = 0; k < m; k++) K[k * m + j] = (k == j) - r->coupling[k].ratio * lambda[r->coupling[k].on];
+  }
+  r->coupling_lost = !dynamics_eliminate (K, x, m);
+  for (int k = 0; k < m; k++) r->reaction[r->coupling[k].row] = -x[k];
+}
+
 /* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
  * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
   pw_run_gamma (r, v, gamma);
   if (r->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
-  if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, f);
+  if (r->forces == PW_FORCES_AT_LIMITS) {
+    if (r->couplings > 0) dynamics_couple (r, f, gamma);
+    pw_add_given_forces (r, f);
+  }
   return f;
 }
 

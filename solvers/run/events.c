@@ -42,6 +42,9 @@
 /* Distance of a multiplier [limits], or of u [units], from the boundary of a mode that is not round-off, nor that of
  * initial values with 6 digits. */
 #define EVENTS_BOUNDARY 1e-6
+#define DECISION_DEPENDENT 1e-11 /* squared sine of an equation that depends on others: it has a round-off of 1e-13 */
+enum { DECISION_MIXED = -2 };    /* number of solutions: friction of contacts and circles, which are not solved */
+enum { DECISION_MOST = 5000 };   /* combinations of modes that are tried, about a microsecond each */
 enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
 
 typedef struct pw_events {
@@ -53,6 +56,9 @@ typedef struct pw_events {
   unsigned char *armed;                 /* 1: u has left its root, so that it may return there */
   unsigned char *triggered;             /* 1: at the root that is the state reached */
   unsigned char *rests;                 /* 1: u is 0 after an impact */
+  unsigned char *spare;                 /* 1: it holds since others do, on which it depends: its multiplier is 0 */
+  int *partner;                         /* of friction: its normal equation; -1: none */
+  int *place;                           /* in D; -1: not in it */
   unsigned char *enforced;              /* rows: what r->enforced points to */
   unsigned char *blocked;               /* n: 1 for equations of a decision that depend on those that hold */
   unsigned char *other;                 /* rows: active equations of the saddle of a decision */
@@ -77,8 +83,12 @@ typedef struct pw_events {
   double *A, *b, *x, *lo, *hi, *factor; /* n x n; n; factor: n (n + 1) */
   double *towards;                      /* n: of circles at their limit, the direction of x */
   int *held;                            /* n: those that hold */
-  signed char *trial;                   /* n: modes */
-  double *f, *a, *gamma, *lambda;       /* coords + 3; the same; rows; 2 rows */
+  int *on;              /* n: of friction the place of its normal equation, whose x its lo and hi multiply; -1: none */
+  unsigned char *fixed; /* n: 1: it slides at a velocity, its trial mode stays */
+  double *choice;       /* 3 n */
+  unsigned char *extra; /* n: 1: it depends on those that hold, and is left out */
+  signed char *trial;   /* n: modes */
+  double *f, *a, *gamma, *lambda; /* coords + 3; the same; rows; 2 rows */
 } pw_events;
 
 static int events_allocate (pw_run *r) {
@@ -91,18 +101,20 @@ static int events_allocate (pw_run *r) {
                               &x->direction,  &x->bias, &x->reach, &x->towards,  &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
   signed char **const mode[] = { &x->mode, &x->before, &x->trial };
-  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked };
+  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked, &x->spare, &x->fixed, &x->extra };
+  int **const index[] = { &x->row, &x->list, &x->held, &x->partner, &x->place, &x->on };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
-    x->row = pw_layout_alloc (&l, n, sizeof *x->row);
-    x->list = pw_layout_alloc (&l, n, sizeof *x->list);
-    x->held = pw_layout_alloc (&l, n, sizeof *x->held);
     x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
     for (size_t i = 0; i < sizeof number / sizeof *number; i++) *number[i] = pw_layout_alloc (&l, n, sizeof (double));
     for (int i = 0; i < 4; i++) *function[i] = pw_layout_alloc (&l, 2 * n, sizeof (double));
     for (int i = 0; i < 3; i++) *mode[i] = pw_layout_alloc (&l, n, 1);
-    for (int i = 0; i < 4; i++) *flag[i] = pw_layout_alloc (&l, n, 1);
+    for (size_t i = 0; i < sizeof flag / sizeof *flag; i++) *flag[i] = pw_layout_alloc (&l, n, 1);
+    for (size_t i = 0; i < sizeof index / sizeof *index; i++) *index[i] = pw_layout_alloc (&l, n, sizeof (int));
+    r->coupling = pw_layout_alloc (&l, n, sizeof *r->coupling);
+    r->coupling_memory = pw_layout_alloc (&l, 2 * coords + rows + n * (n + 1), sizeof (double));
     x->enforced = pw_layout_alloc (&l, rows, 1);
     x->other = pw_layout_alloc (&l, rows, 1);
+    x->choice = pw_layout_alloc (&l, 3 * n, sizeof *x->choice);
     x->A = pw_layout_alloc (&l, n * n, sizeof *x->A);
     x->factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->factor);
     x->f = pw_layout_alloc (&l, coords, sizeof *x->f);
@@ -140,6 +152,16 @@ static void events_limits (pw_run *r) {
     limit->sliding[1] = fmin (limit->most, events_magnitude (r, i, 1, r->s->limit[x->row[i]].sliding[1]));
     limit->sliding[0] = -limit->sliding[1];
   }
+}
+
+/* 1 for friction of a contact that is open: it is off, whatever its mode. */
+static int events_apart (const pw_events *x, int i) {
+  return x->partner[i] >= 0 && x->mode[x->partner[i]] != 0;
+}
+
+/* The sign of a multiplier that has one limit. */
+static int events_sign (const pw_bounds *limit) {
+  return isinf (limit->least) ? -1 : 1;
 }
 
 /* The mode of an equation that does not hold: of one with two finite limits by the sign of u. */
@@ -250,8 +272,9 @@ static void events_update (pw_run *r) {
     const int row = x->row[i], circle = x->limit[i].circle, *source = r->s->limit_source[row];
     const double limit = x->limit[i].sliding[1];
     pw_given *by = &r->given[row];
-    *by = (pw_given){ x->mode[i] != 0, { source[0], source[1] }, .first = circle ? row + 1 - circle : -1 };
-    if (x->mode[i] == 0) continue;
+    const int is_given = x->mode[i] != 0 && x->partner[i] < 0; /* others: pw_couple */
+    *by = (pw_given){ is_given, { source[0], source[1] }, .first = circle ? row + 1 - circle : -1 };
+    if (!is_given) continue;
     if (circle == 1) circle_direction (r, i, n, by_u);
     const double part = circle ? n[circle - 1] : x->mode[i];
     const int follows = source[1] >= 0 && limit < x->limit[i].most;
@@ -267,6 +290,7 @@ static void events_apply (pw_run *r) {
   int off = 0;
   events_limits (r);
   r->update_given = NULL;
+  r->couplings = 0;
   for (int i = 0; i < r->s->rows; i++) {
     const pw_bounds *limit = &r->s->limit[i];
     x->enforced[i] = pw_can_hold (limit);
@@ -274,11 +298,16 @@ static void events_apply (pw_run *r) {
     off |= !x->enforced[i];
   }
   for (int i = 0; i < x->count; i++) {
-    if (x->mode[i] == 0 && !x->stepping) continue;
+    const int apart = events_apart (x, i), on = x->partner[i];
+    if (x->mode[i] == 0 && !apart && !x->spare[i] && !x->stepping) continue;
     x->enforced[x->row[i]] = 0;
-    r->reaction[x->row[i]] = -(x->stepping ? x->mean[i] : events_given (x, i));
-    if (!x->stepping && (r->s->limit_sources > 0 || x->limit[i].circle)) r->update_given = events_update;
     off = 1;
+    if (on >= 0 && x->mode[i] && !apart)
+      r->coupling[r->couplings++] =
+          (pw_coupling){ x->row[i], x->row[on], events_given (x, i) * events_sign (&x->limit[on]) };
+    if (x->stepping || (on < 0 && x->mode[i]))
+      r->reaction[x->row[i]] = -(x->stepping ? x->mean[i] : events_given (x, i));
+    if (!x->stepping && x->mode[i] && (r->s->limit_sources > 0 || x->limit[i].circle)) r->update_given = events_update;
   }
   r->active = r->enforced = off ? x->enforced : NULL;
   r->redundant_drive = off;
@@ -300,9 +329,9 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
   events_limits (r);
   for (int i = 0; i < x->count; i++) {
     const pw_bounds *limit = &x->limit[i];
-    double y = lambda[x->row[i]];
-    value[2 * i] = isinf (limit->most) ? -1 : (y - limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
-    value[2 * i + 1] = isinf (limit->least) ? -1 : (limit->least - y) / x->force_unit[i] - EVENTS_ROUND_OFF;
+    double y = lambda[x->row[i]], size = x->partner[i] < 0 ? 1 : fabs (lambda[x->row[x->partner[i]]]);
+    value[2 * i] = isinf (limit->most) ? -1 : (y - size * limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
+    value[2 * i + 1] = isinf (limit->least) ? -1 : (size * limit->least - y) / x->force_unit[i] - EVENTS_ROUND_OFF;
     double u = x->mode[i] * x->u[i];
     if (limit->circle == 1) {
       value[2 * i] = (hypot (y, lambda[x->row[i + 1]]) - limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
@@ -310,7 +339,8 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
     }
     if (limit->circle == 2) value[2 * i] = -1;
     if (limit->circle) value[2 * i + 1] = -1;
-    if (x->mode[i] == 0 || limit->circle == 2) continue;
+    if (x->spare[i] || events_apart (x, i)) value[2 * i] = value[2 * i + 1] = -1;
+    if (x->mode[i] == 0 || limit->circle == 2 || events_apart (x, i)) continue;
     value[2 * i] = -u / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
     value[2 * i + 1] = -1;
   }
@@ -322,6 +352,14 @@ static int events_knows_multipliers (const pw_run *r) {
   for (size_t i = 0; i < sizeof kinds / sizeof *kinds && r->method->order > 0; i++) /* not of multistep methods */
     if (pw_stabilised_by (r, kinds[i])) return 1;
   return 0;
+}
+
+/* Where friction and normal forces that depend on each other do not determine the motion. */
+static int events_fail_friction (pw_run *r, double t, pw_error *error) {
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the friction of %s and its normal force depend on each other: there is no "
+                  "solution, or there are several (Painleve)",
+                  t, PW_NAME (pw_system_row_name, r->s, r->coupling->row));
 }
 
 /* pw_crossing_search.at.  Otherwise multipliers are computed from the state: those of some methods are interpolated,
@@ -341,7 +379,7 @@ static int events_at (void *context, double t, double *value, pw_error *error) {
   r->alpha = alpha, r->beta = beta;
   r->statistics = statistics, r->near_singular = near_singular;
   if (status == PW_OK) events_values (r, r->v_at, r->lambda_at, value);
-  return status;
+  return status == PW_OK && r->couplings > 0 && r->coupling_lost ? events_fail_friction (r, t, error) : status;
 }
 
 /* Marks functions of u that have left their root. */
@@ -419,77 +457,124 @@ static void decision_push (pw_run *r, pw_saddle *saddle, double *v) {
   for (int j = 0; j < s->coords; j++) v[j] += x->a[j];
 }
 
-/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  Of equations that depend
- * on each other the later ones are left out if `skips` is 1; otherwise PW_RETRY. */
+/* 1 for friction whose contact is open: nothing is required of it. */
+static int decision_apart (const pw_events *x, int k) {
+  return x->on[k] >= 0 && x->trial[x->on[k]] != 0;
+}
+
+/* The multiplier of an equation at the limit of its trial mode; of friction as a multiple of the normal one. */
+static double decision_given (const pw_events *x, int k) {
+  const double limit = x->trial[k] > 0 ? x->hi[k] : x->lo[k];
+  if (x->limit[x->list[k]].circle) return limit * x->towards[k];
+  return x->on[k] < 0 ? limit : limit * events_sign (&x->limit[x->list[x->on[k]]]);
+}
+
+/* The matrix K and right-hand side y of z = 0 for the m equations x->held: x of those at limits are given, friction
+ * that slides adds to the column of its normal equation. */
+static void decision_assemble (pw_events *x, int m, double *K, double *y) {
+  const int n = x->n;
+  for (int i = 0; i < m; i++) {
+    const double *row = x->A + x->held[i] * n;
+    y[i] = x->b[x->held[i]];
+    for (int j = 0; j < m; j++) {
+      K[i * m + j] = row[x->held[j]];
+      for (int k = 0; k < n; k++)
+        if (x->on[k] == x->held[j] && x->trial[k]) K[i * m + j] += row[k] * decision_given (x, k);
+    }
+    for (int k = 0; k < n; k++)
+      if (x->trial[k] && x->on[k] < 0) y[i] -= row[k] * x->x[k];
+  }
+}
+
+/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given.  Of equations that depend on each
+ * other the later ones are left out, with x = 0, if they are friction or `skips` is 1; otherwise PW_RETRY. */
 static int decision_solve (pw_events *x, int skips) {
   const int n = x->n;
-  double *L = x->factor, *y = L + n * n;
   int m = 0, *held = x->held;
   for (int k = 0; k < n; k++) {
-    if (x->trial[k]) continue;
-    const double *row = x->A + k * n;
-    double *Lm = L + m * n;
-    held[m] = k;
-    y[m] = x->b[k];
-    for (int i = 0; i < n; i++)
-      if (x->trial[i]) y[m] -= row[i] * x->x[i];
-    for (int j = 0; j <= m; j++) {
-      Lm[j] = 0.5 * (row[held[j]] + x->A[held[j] * n + k]);
-      for (int i = 0; i < j; i++) Lm[j] -= Lm[i] * L[j * n + i];
-      if (j < m) Lm[j] /= L[j * n + j];
+    x->extra[k] = 0;
+    if (x->trial[k] == 0 && !decision_apart (x, k)) held[m++] = k;
+  }
+  double *K = x->factor, *y = K + m * m;
+  decision_assemble (x, m, K, y);
+  for (int i = 0; i < m; i++) {
+    if (!(fabs (K[i * m + i]) > DECISION_DEPENDENT * x->A[held[i] * n + held[i]])) {
+      if (!skips && x->on[held[i]] < 0) return PW_RETRY;
+      x->extra[held[i]] = 1, y[i] = 0;
+      for (int k = 0; k < m; k++) K[i * m + k] = K[k * m + i] = k == i;
     }
-    x->x[k] = 0;
-    if (!(Lm[m] > 1e-13 * row[k])) {
-      if (!skips) return PW_RETRY;
-      continue;
+    for (int k = i + 1; k < m; k++) {
+      const double factor = K[k * m + i] / K[i * m + i];
+      for (int j = i; j < m; j++) K[k * m + j] -= factor * K[i * m + j];
+      y[k] -= factor * y[i];
     }
-    Lm[m] = sqrt (Lm[m]);
-    for (int i = 0; i < m; i++) y[m] -= Lm[i] * y[i];
-    y[m] /= Lm[m];
-    m++;
   }
   for (int i = m - 1; i >= 0; i--) {
-    for (int k = i + 1; k < m; k++) y[i] -= L[k * n + i] * y[k];
-    x->x[held[i]] = y[i] /= L[i * n + i];
+    for (int j = i + 1; j < m; j++) y[i] -= K[i * m + j] * y[j];
+    x->x[held[i]] = y[i] /= K[i * m + i];
   }
+  for (int k = 0; k < n; k++)
+    if (x->on[k] >= 0 && (x->trial[k] || decision_apart (x, k)))
+      x->x[k] = decision_apart (x, k) ? 0 : decision_given (x, k) * x->x[x->on[k]];
   return PW_OK;
+}
+
+static double decision_z (const pw_events *x, int k) {
+  double z = x->b[k];
+  for (int i = 0; i < x->n; i++) z -= x->A[k * x->n + i] * x->x[i];
+  return z;
 }
 
 /* By how much equation k of D violates its conditions; *to: the mode that would satisfy them.  size: of z that are
  * round-off. */
 static double decision_violation (const pw_events *x, int k, double size, int *to) {
-  const double unit = sqrt (x->A[k * x->n + k]);
-  double z = x->b[k];
+  const double unit = sqrt (x->A[k * x->n + k]), scale = x->on[k] < 0 ? 1 : fabs (x->x[x->on[k]]);
+  const double hi = x->on[k] < 0 ? x->hi[k] : x->hi[k] * scale, lo = x->on[k] < 0 ? x->lo[k] : x->lo[k] * scale;
+  *to = x->x[k] > hi ? 1 : -1;
   if (x->limit[x->list[k]].circle) return 0; /* decision_round */
-  *to = x->x[k] > x->hi[k] ? 1 : -1;
-  if (x->trial[k] == 0) return unit * fmax (x->x[k] - x->hi[k], x->lo[k] - x->x[k]);
-  for (int i = 0; i < x->n; i++) z -= x->A[k * x->n + i] * x->x[i];
+  if (x->fixed[k] || decision_apart (x, k)) return 0;
+  if (x->extra[k]) { /* it cannot hold if those on which it depends do not satisfy it */
+    const double z = decision_z (x, k) / unit;
+    *to = isinf (lo) || (!isinf (hi) && z > 0) ? 1 : -1;
+    return *to * z - 1e-9 * size;
+  }
+  if (x->trial[k] == 0) return unit * fmax (x->x[k] - hi, lo - x->x[k]);
   *to = 0;
-  return -x->trial[k] * z / unit - 1e-12 * size;
+  return -x->trial[k] * decision_z (x, k) / unit - 1e-12 * size;
+}
+
+static void decision_give (pw_events *x) {
+  for (int k = 0; k < x->n; k++)
+    if (x->trial[k] && x->on[k] < 0) x->x[k] = decision_given (x, k);
+}
+
+/* The size of z in units of each equation. */
+static double decision_size (const pw_events *x) {
+  double size = 0;
+  for (int k = 0; k < x->n; k++) {
+    const double unit = sqrt (x->A[k * x->n + k]);
+    size = fmax (size, fmax (fabs (x->b[k]) / unit, fabs (x->x[k]) * unit));
+  }
+  return size;
 }
 
 /* Finds x and trial modes between lo and hi, from the present trial modes on: the largest violation changes its mode;
  * after many changes, which may cycle, the first one (Murty).  An equation that depends on those that hold stays at its
- * limit, where it is satisfied, too.  PW_RETRY if that fails. */
-static int decision_pivot (pw_events *x) {
+ * limit, where it is satisfied, too; if `skips` is 1, it is left out.  PW_RETRY if that fails. */
+static int decision_pivot (pw_events *x, int skips) {
   const int n = x->n;
   int changed = -1, before = 0;
-  memset (x->blocked, 0, (size_t)n);
+  for (int k = 0; k < n; k++) x->blocked[k] = 0;
   for (int pass = 0; pass < 50 * (n + 1); pass++) {
     int worst = -1, to = 0, next = 0;
-    double most = 0, size = 0;
-    for (int k = 0; k < n; k++)
-      if (x->trial[k])
-        x->x[k] = x->trial[k] < 0 ? x->lo[k] : x->hi[k] * (x->limit[x->list[k]].circle ? x->towards[k] : 1);
-    if (decision_solve (x, 0) != PW_OK) {
+    double most = 0;
+    decision_give (x);
+    if (decision_solve (x, skips) != PW_OK) {
       if (changed < 0 || before == 0) return PW_RETRY;
       x->trial[changed] = (signed char)before, x->blocked[changed] = 1;
       continue;
     }
-    for (int k = 0; k < n; k++) {
-      const double unit = sqrt (x->A[k * n + k]);
-      size = fmax (size, fmax (fabs (x->b[k]) / unit, fabs (x->x[k]) * unit));
-    }
+    const double size = decision_size (x);
     for (int k = 0; k < n && (worst < 0 || pass < 10 * n); k++) {
       const double violation = x->blocked[k] ? 0 : decision_violation (x, k, size, &next);
       if (violation > most) most = violation, worst = k, to = next;
@@ -530,7 +615,7 @@ static int decision_minimum (pw_events *x) {
   double before = INFINITY;
   for (int pass = 0; pass < 10000; pass++) {
     double change = 0;
-    const int status = decision_pivot (x);
+    const int status = decision_pivot (x, 0);
     for (int k = 0; k < x->n && status == PW_OK; k++)
       if (x->limit[x->list[k]].circle == 1) change = fmax (change, decision_round (x, k));
     if (status != PW_OK || change == 0 || (change < 1e-12 && change >= before)) return status;
@@ -539,7 +624,67 @@ static int decision_minimum (pw_events *x) {
   return PW_RETRY;
 }
 
-static int decision_fail (pw_run *r, pw_saddle *saddle, pw_error *error) {
+/* The next combination of trial modes: of friction and two-sided limits 0, 1, -1, of one-sided ones 0 and their limit;
+ * 0 after the last one. */
+static int decision_next (pw_events *x) {
+  for (int k = 0; k < x->n; k++) {
+    const signed char off = isinf (x->lo[k]) ? 1 : isinf (x->hi[k]) ? -1 : 0;
+    if (x->fixed[k] || (off == 0 && x->lo[k] == x->hi[k])) continue;
+    const signed char now = x->trial[k];
+    x->trial[k] = off ? (now ? 0 : off) : now == 0 ? 1 : now == 1 ? -1 : 0;
+    if (x->trial[k]) return 1;
+  }
+  return 0;
+}
+
+/* With friction that depends on reactions there may be no solution, or several.  All combinations of modes are tried;
+ * different solutions differ in A x.  PW_OK: x and the trial modes are the only one; PW_RETRY: there is none, *count =
+ * 0, or there are *count = 2; -1: not known, for too many equations.  found: 1 if x and the trial modes are one. */
+static int decision_enumerate (pw_events *x, int found, int *count) {
+  const int n = x->n;
+  double combinations = 1, *best = x->choice, *forces = best + n, *free_modes = forces + n;
+  for (int k = 0; k < n; k++) combinations *= x->fixed[k] ? 1 : isinf (x->lo[k]) || isinf (x->hi[k]) ? 2 : 3;
+  *count = -1;
+  if (combinations > DECISION_MOST) return found ? PW_OK : PW_RETRY;
+  *count = found;
+  double size = 0; /* of z without x */
+  for (int k = 0; k < n; k++) size = fmax (size, fabs (x->b[k]) / sqrt (x->A[k * n + k]));
+  for (int k = 0; k < n && found; k++) best[k] = x->x[k], free_modes[k] = x->trial[k], forces[k] = decision_z (x, k);
+  for (int k = 0; k < n; k++) x->trial[k] = x->fixed[k] ? x->trial[k] : 0;
+  do {
+    int to, good, same = 1;
+    decision_give (x);
+    (void)decision_solve (x, 1);
+    good = decision_size (x) < 1e6 * size; /* else of equations that nearly depend on each other */
+    for (int k = 0; k < n; k++) good &= decision_violation (x, k, size, &to) <= 1e-9 * size;
+    for (int k = 0; k<n && * count> 0; k++)
+      same &= fabs (decision_z (x, k) - forces[k]) <= 1e-6 * size * sqrt (x->A[k * n + k]);
+    if (!good || (*count > 0 && same)) continue;
+    if (++*count > 1) return PW_RETRY;
+    for (int k = 0; k < n; k++) best[k] = x->x[k], free_modes[k] = x->trial[k], forces[k] = decision_z (x, k);
+  } while (decision_next (x));
+  for (int k = 0; k < n && *count == 1; k++) x->trial[k] = (signed char)free_modes[k];
+  decision_give (x);
+  return *count == 1 ? decision_solve (x, 1) : PW_RETRY;
+}
+
+/* Solves the problem of a decision; *count: as above, -1 without friction that depends on reactions.  DECISION_MIXED:
+ * there is such friction and a circle. */
+static int decide (pw_events *x, int *count) {
+  int coupled = 0, circles = 0;
+  for (int k = 0; k < x->n; k++) coupled |= x->on[k] >= 0, circles |= x->limit[x->list[k]].circle;
+  *count = coupled && circles ? DECISION_MIXED : -1;
+  if (!coupled) return decision_minimum (x);
+  if (circles) return PW_RETRY;
+  int status = decision_pivot (x, 0);
+  for (int k = 0; k < x->n && status != PW_OK; k++)
+    if (!x->fixed[k]) x->trial[k] = 0;
+  if (status != PW_OK) status = decision_pivot (x, 1);
+  return decision_enumerate (x, status == PW_OK, count);
+}
+
+/* count: of solutions, -1: not known, or DECISION_MIXED. */
+static int decision_fail (pw_run *r, pw_saddle *saddle, int count, pw_error *error) {
   pw_events *x = r->events;
   char elements[300];
   memset (x->other, 0, (size_t)r->s->rows);
@@ -548,8 +693,12 @@ static int decision_fail (pw_run *r, pw_saddle *saddle, pw_error *error) {
   if (saddle == NULL && error && error->status == PW_RESOURCE) return PW_RESOURCE;
   return pw_fail (error, PW_METHOD, "t = %.6g s: whether %s hold%s cannot be decided: %s", r->t, elements,
                   strchr (elements, ',') ? "" : "s",
-                  saddle ? "their equations depend on each other or on other constraints"
-                         : "without them the accelerations are not determined");
+                  count == DECISION_MIXED
+                      ? "friction of contacts together with grips of rolling wheels is not supported"
+                  : count == 0 ? "with this friction there is no solution (Painleve)"
+                  : count > 1  ? "with this friction there are several solutions (Painleve)"
+                  : saddle     ? "their equations depend on each other or on other constraints"
+                               : "without them the accelerations are not determined");
 }
 
 /* Adds to the ledger what an impact dissipates and what constraints supply in it: impulses -x of D, x->lambda of the
@@ -563,11 +712,12 @@ static void impact_ledger (pw_run *r) {
   for (int i = 0; i < s->entries; i++) {
     const pw_element_batch *k = &s->batch[s->entry[i].batch];
     const int first = k->row + s->entry[i].element * k->kind->rows;
+    const int normal = k->kind->rows > 0 && s->limit[first].relative ? s->limit[first].partner : -1;
     for (int row = first; row < first + k->kind->rows && s->entry[i].type == PW_WORK && !k->kind->power; row++)
       r->ledger[i] -= x->lambda[row] * eta[row];
     for (int n = 0; n < x->n && s->entry[i].type == PW_LOSS; n++) {
       const int e = x->list[n];
-      if (x->row[e] >= first && x->row[e] < first + k->kind->rows)
+      if ((x->row[e] >= first && x->row[e] < first + k->kind->rows) || x->row[e] == normal)
         r->ledger[i] += 0.5 * x->x[n] * (x->u_before[e] + x->u[e]);
     }
   }
@@ -583,36 +733,76 @@ static void impact_end (pw_run *r, const double *v) {
   impact_ledger (r);
 }
 
+/* Adds an equation to D, with the limits of its multiplier or, of friction, of the multiple of the normal one. */
+static void decide_add (pw_events *x, int i, double lo, double hi, signed char trial) {
+  const int k = x->n++;
+  x->list[k] = i, x->place[i] = k;
+  x->lo[k] = lo, x->hi[k] = hi, x->trial[k] = trial, x->fixed[k] = 0;
+  x->on[k] = x->partner[i] < 0 ? -1 : x->place[x->partner[i]];
+}
+
 /* 1 if a holonomic equation does not hold because g has left 0. */
 static int events_open (const pw_run *r, int i, double g) {
   const pw_events *x = r->events;
   return (x->row[i] < r->s->holonomic) && !x->triggered[i] && x->mode[i] * g > EVENTS_SMALL * x->unit[i];
 }
 
+/* Impulses with the restitution of each equation times `part`; *loss: the energy that they dissipate.  After a motion
+ * too short to be resolved, all these equations hold: it is the end of an accumulation, also of a block that rocks. */
+static int impact_try (pw_events *x, double part, int *count, double *loss) {
+  for (int k = 0; k < x->n; k++) {
+    const int i = x->list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
+    x->b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->on[k] < 0 ? part * x->limit[i].restitution : 0));
+  }
+  for (int k = 0; k < x->n && x->fell; k++)
+    if (x->on[k] < 0) x->lo[k] = -INFINITY, x->hi[k] = INFINITY, x->trial[k] = 0;
+  const int status = x->fell ? decision_pivot (x, 1) : decide (x, count);
+  *loss = 0;
+  for (int k = 0; k < x->n; k++) *loss += x->x[k] * (x->u_before[x->list[k]] + decision_z (x, k) - x->b[k]) / 2;
+  for (int k = 0; k < x->n; k++) *loss += x->x[k] * x->u_before[x->list[k]] / 2;
+  return status;
+}
+
+/* Newton's law of several impacts, or with friction, may add energy (Kane 1984; Stronge 1990, Proceedings of the Royal
+ * Society A 431, 169-181); without restitution it does not.  Where it would, all restitutions are reduced by the
+ * largest factor with which it does not. */
+static int impact_solve (pw_events *x, int *count) {
+  double loss, low = 0, high = 1, size = 0;
+  int status = impact_try (x, 1, count, &loss);
+  for (int k = 0; k < x->n; k++) size += fabs (x->x[k] * x->u_before[x->list[k]]);
+  if (status != PW_OK || loss >= -1e-12 * size) return status;
+  for (int i = 0; i < 40; i++) {
+    const double part = (low + high) / 2;
+    if (impact_try (x, part, count, &loss) == PW_OK && loss >= 0)
+      low = part;
+    else
+      high = part;
+  }
+  return impact_try (x, low, count, &loss);
+}
+
 /* Impacts: equations that do not hold, and whose u would leave its side.  *any: 1 if there are. */
 static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error) {
   pw_events *x = r->events;
   *any = x->n = 0;
+  for (int i = 0; i < x->count; i++) x->place[i] = -1;
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
     const double u = x->u_before[i] / x->unit[i];
     const int one_sided = pw_is_one_sided (&x->limit[i]);
     const int hits = x->mode[i] && x->mode[i] * u < -EVENTS_SMALL;
     x->impulse[i] = 0, x->rests[i] = 0;
+    if (x->partner[i] >= 0 && x->place[x->partner[i]] >= 0) decide_add (x, i, x->limit[i].least, x->limit[i].most, 0);
     if (!one_sided || events_open (r, i, g[i]) || (x->mode[i] && x->mode[i] * u > EVENTS_SMALL)) continue;
     *any |= hits;
-    x->trial[x->n] = events_off (x, i, 0);
-    x->lo[x->n] = isinf (x->limit[i].least) ? -INFINITY : 0, x->hi[x->n] = isinf (x->limit[i].most) ? INFINITY : 0;
-    x->list[x->n++] = i;
+    decide_add (x, i, isinf (x->limit[i].least) ? -INFINITY : 0, isinf (x->limit[i].most) ? INFINITY : 0,
+                events_off (x, i, 0));
   }
   if (!*any) return PW_OK;
   pw_saddle *saddle = decision_open (r, 1, error);
-  for (int k = 0; saddle && k < x->n; k++) {
-    const int i = x->list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
-    x->b[k] *= 1 + (x->mode[i] && !slow ? x->limit[i].restitution : 0);
-  }
-  if (saddle == NULL || decision_pivot (x) != PW_OK) {
-    const int status = decision_fail (r, saddle, error);
+  int count = -1;
+  if (saddle == NULL || impact_solve (x, &count) != PW_OK) {
+    const int status = decision_fail (r, saddle, count, error);
     pw_saddle_close (saddle);
     return status;
   }
@@ -631,31 +821,43 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
 static void decide_list (pw_run *r, const double *g, int jumps) {
   pw_events *x = r->events;
   x->n = 0;
+  for (int i = 0; i < x->count; i++) x->place[i] = -1;
   events_u (r, r->v, 0, x->u);
   for (int i = 0, equations; i < x->count; i += equations) {
     equations = x->limit[i].circle ? 2 : 1;
+    const int on = x->partner[i];
     const double speed = equations == 2 ? hypot (x->u[i], x->u[i + 1]) : fabs (x->u[i]), u = speed / x->unit[i];
     const int open = !x->rests[i] && events_open (r, i, g[i]);
     const int misses = equations == 2 && x->triggered[i] && x->mode[i] && speed > x->reach[i]; /* u passes beside 0 */
-    if (((jumps && !open) || misses) && u > EVENTS_SMALL) events_slide (x, i, x->u);
+    if (on >= 0 && x->place[on] < 0) {
+      x->mode[i] = 1, x->spare[i] = 0;
+      continue;
+    }
+    const int moves = (jumps || (on >= 0 && x->before[on])) && !open;
+    if ((moves || misses) && u > EVENTS_SMALL) events_slide (x, i, x->u);
     const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps && !misses;
-    if (open || (x->mode[i] && !rolls && u > EVENTS_SMALL)) continue;
-    const double tighter = x->mode[i] == 0 && x->triggered[i] ? EVENTS_TIGHTER * x->force_unit[i] : 0;
+    const int slides = x->mode[i] && !rolls && u > EVENTS_SMALL;
+    if (open || (slides && on < 0)) continue;
+    const double unit = on < 0 ? x->force_unit[i] : x->limit[i].most;
+    const double tighter = x->mode[i] == 0 && x->triggered[i] ? EVENTS_TIGHTER * unit : 0;
     for (int k = i; k < i + equations; k++) {
-      x->lo[x->n] = fmin (0, x->limit[k].least + tighter), x->hi[x->n] = fmax (0, x->limit[k].most - tighter);
-      x->trial[x->n] = x->mode[k], x->towards[x->n] = x->direction[k];
-      x->list[x->n++] = k;
+      if (slides)
+        decide_add (x, k, x->limit[k].sliding[0], x->limit[k].sliding[1], x->mode[k]);
+      else
+        decide_add (x, k, fmin (0, x->limit[k].least + tighter), fmax (0, x->limit[k].most - tighter),
+                    on < 0 ? x->mode[k] : 0);
+      x->fixed[x->n - 1] = (unsigned char)slides, x->towards[x->n - 1] = x->direction[k];
     }
   }
   events_apply (r); /* forces of those outside D */
   if (r->update_given) r->update_given (r);
 }
 
-/* decision_pivot, where one that slides may have a smaller multiplier than one that holds.  x are `unit` times what
+/* decide, where one that slides may have a smaller multiplier than one that holds.  x are `unit` times what
  * multipliers exceed `known` by (NULL: 0). */
-static int decide_sliding (pw_events *x, double unit, const double *known) {
+static int decide_sliding (pw_events *x, double unit, const double *known, int *count) {
   for (int again = 1; again;) {
-    if (decision_minimum (x) != PW_OK) return PW_RETRY;
+    if (decide (x, count) != PW_OK) return PW_RETRY;
     again = 0;
     for (int k = 0; k < x->n; k++) {
       const int i = x->list[k];
@@ -672,13 +874,18 @@ static int decide_sliding (pw_events *x, double unit, const double *known) {
 static int decide_modes (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   pw_saddle *saddle = x->n > 0 ? decision_open (r, 0, error) : NULL;
-  int status = saddle ? decide_sliding (x, 1, NULL) : PW_OK;
-  if (x->n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, error);
+  int count = -1, status = saddle ? decide_sliding (x, 1, NULL, &count) : PW_OK;
+  if (x->n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, count, error);
   for (int k = 0; k < x->n && status == PW_OK; k++) {
-    x->mode[x->list[k]] = x->trial[k];
-    x->direction[x->list[k]] = x->towards[k];
-    if (x->limit[x->list[k]].circle == 1) circle_set_bias (r, x->list[k], 0);
-    x->trial[k] = 0, x->b[k] = x->u[x->list[k]];
+    const int i = x->list[k], apart = decision_apart (x, k);
+    x->mode[i] = apart ? 1 : x->trial[k];
+    x->spare[i] = x->extra[k] && !apart;
+    x->direction[i] = x->towards[k];
+    if (x->limit[i].circle == 1) circle_set_bias (r, i, 0);
+  }
+  for (int k = 0; k < x->n && status == PW_OK; k++) {
+    x->on[k] = -1, x->trial[k] = (signed char)x->fixed[k];
+    x->x[k] = 0, x->b[k] = x->u[x->list[k]];
   }
   if (x->n > 0 && status == PW_OK) {
     (void)decision_solve (x, 1);
@@ -692,7 +899,8 @@ static int decide_modes (pw_run *r, pw_error *error) {
 static int events_log (pw_run *r) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++) {
-    if ((x->mode[i] == x->before[i] && x->impulse[i] == 0) || x->limit[i].circle == 2) continue;
+    const int on = x->partner[i], changes = x->mode[i] != x->before[i] && (on < 0 || !(x->mode[on] || x->before[on]));
+    if ((!changes && x->impulse[i] == 0) || x->limit[i].circle == 2) continue;
     if (pw_grow (&r->event, (size_t)r->event_count, &r->event_room, sizeof *r->event) != PW_OK) return PW_RESOURCE;
     r->event[r->event_count++] =
         (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], x->mode[i], x->impulse[i] != 0 };
@@ -918,6 +1126,7 @@ static void events_units (pw_run *r) {
     const double largest = fmax (isinf (least) ? 0 : -least, isinf (most) ? 0 : most);
     const double scale = force > 0 ? force * arm : 1;
     x->force_unit[i] = r->s->limit_source[x->row[i]][0] >= 0 ? fmax (largest, scale) : largest > 0 ? largest : scale;
+    if (x->partner[i] >= 0) x->force_unit[i] = x->force_unit[x->partner[i]];
     x->unit[i] = L / arm / ((x->row[i] < r->s->holonomic) ? 1 : T);
   }
 }
@@ -963,7 +1172,7 @@ static int events_initial_friction (pw_run *r, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
-    if (!x->limit[i].initially_slides) continue;
+    if (!x->limit[i].initially_slides || x->partner[i] >= 0) continue; /* contacts are not closed yet */
     x->mode[i] = events_slides (x, i) ? events_off (x, i, x->u_before[i]) : 0;
     holds |= x->mode[i] == 0;
   }
@@ -1002,6 +1211,10 @@ int pw_events_open (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   for (int i = 0; i < s->rows; i++)
     if (pw_is_limited (s, i) && pw_can_hold (&s->limit[i])) x->row[x->count] = i, x->limit[x->count++] = s->limit[i];
+  for (int i = 0; i < x->count; i++) {
+    x->partner[i] = x->limit[i].relative ? 0 : -1;
+    while (x->limit[i].relative && x->row[x->partner[i]] != x->limit[i].partner) x->partner[i]++;
+  }
   x->start_t = x->previous_t = NAN, x->origin = r->origin;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_initial (r);
@@ -1055,10 +1268,12 @@ int pw_events_check_modes (pw_run *r, const double *v, const double *lambda, pw_
   for (int i = 0; i < x->count; i++) {
     const char *name = PW_NAME (pw_system_row_name, r->s, x->row[i]);
     const pw_bounds *limit = &x->limit[i];
-    const double y = lambda[x->row[i]], u = x->mode[i] * x->u[i], least = y - limit->least, most = limit->most - y;
+    const double y = lambda[x->row[i]], u = x->mode[i] * x->u[i];
+    const double size = x->partner[i] < 0 ? 1 : fabs (lambda[x->row[x->partner[i]]]);
+    const double least = y - size * limit->least, most = size * limit->most - y;
     const double unit = x->mode[i] ? x->unit[i] : x->force_unit[i], margin = x->mode[i] ? u : fmin (least, most);
     const int changes = margin > -EVENTS_BOUNDARY * unit;
-    if (margin > EVENTS_BOUNDARY * unit) continue;
+    if (margin > EVENTS_BOUNDARY * unit || x->spare[i] || events_apart (x, i)) continue;
     if (x->mode[i] == 0)
       return pw_fail (error, PW_METHOD, "t = %.6g s: %s is %s a limit of its reaction: %.9g, limit %.9g", r->t, name,
                       changes ? "at" : "beyond", -y, -(least < most ? limit->least : limit->most));
@@ -1079,7 +1294,10 @@ int pw_impulses_open (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   if (x == NULL || x->stepping) return PW_OK;
   for (int i = 0; i < x->count; i++)
-    if (x->limit[i].circle)
+    if (x->partner[i] >= 0)
+      return pw_fail (error, PW_INPUT, "%s: the friction of %s depends on a reaction: use rk4 or radau",
+                      r->method->name, PW_NAME (pw_system_row_name, r->s, x->row[i]));
+    else if (x->limit[i].circle)
       return pw_fail (error, PW_INPUT, "%s: the grip of %s limits a resultant: use rk4, erk8 or radau", r->method->name,
                       PW_NAME (pw_system_row_name, r->s, x->row[i]));
   for (int i = 0; i < x->count; i++) x->mean[i] = x->mode[i] ? events_given (x, i) : r->lambda[x->row[i]];
@@ -1119,10 +1337,8 @@ static void impulses_list (pw_run *r, double h, const double *g) {
       x->jumped = 1;
       x->rests[i] = before > -EVENTS_SLOW || x->limit[i].restitution == 0;
     }
-    x->lo[x->n] = h * (x->limit[i].least - x->mean[i]), x->hi[x->n] = h * (x->limit[i].most - x->mean[i]);
     x->b[x->n] = x->u[i] + (x->rests[i] ? 0 : x->limit[i].restitution * x->u_before[i]);
-    x->trial[x->n] = x->mode[i];
-    x->list[x->n++] = i;
+    decide_add (x, i, h * (x->limit[i].least - x->mean[i]), h * (x->limit[i].most - x->mean[i]), x->mode[i]);
   }
 }
 
@@ -1138,7 +1354,8 @@ int pw_impulses_solve (pw_run *r, pw_projector *p, double h, double t, const dou
   events_u (r, v, 0, x->u);
   impulses_list (r, h, x->now);
   decision_matrix (r, r->saddle);
-  if (decide_sliding (x, h, x->mean) != PW_OK) return decision_fail (r, r->saddle, error);
+  int count = -1;
+  if (decide_sliding (x, h, x->mean, &count) != PW_OK) return decision_fail (r, r->saddle, count, error);
   decision_push (r, r->saddle, v);
   if (pw_update_velocities (r->w, v) != PW_OK) return pw_fail_signal (t, error);
   impact_end (r, v);
@@ -1162,9 +1379,8 @@ static int impulses_violated (pw_run *r, const double *g) {
     const double off = (holds ? -fabs (g[i]) : side * g[i]) / x->unit[i];
     if (!holds && !(off < -EVENTS_SMALL)) continue;
     any |= off < -EVENTS_SMALL;
-    x->lo[x->n] = holds || side > 0 ? -INFINITY : 0, x->hi[x->n] = holds || side < 0 ? INFINITY : 0;
-    x->trial[x->n] = 0, x->b[x->n] = g[i];
-    x->list[x->n++] = i;
+    x->b[x->n] = g[i];
+    decide_add (x, i, holds || side > 0 ? -INFINITY : 0, holds || side < 0 ? INFINITY : 0, 0);
   }
   return any;
 }
@@ -1178,7 +1394,7 @@ int pw_impulses_project (pw_run *r, pw_projector *p, double t, double *q, const 
     if (!impulses_violated (r, x->now)) return PW_OK;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
     decision_matrix (r, p->position);
-    if (decision_pivot (x) != PW_OK) return PW_RETRY;
+    if (decision_pivot (x, 0) != PW_OK) return PW_RETRY;
     decision_push (r, p->position, q);
   }
   return PW_RETRY;
@@ -1189,6 +1405,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   if (x == NULL) return;
   pw_archive_bytes (a, x->mode, (size_t)x->count);
   pw_archive_bytes (a, x->triggered, (size_t)x->count);
+  pw_archive_bytes (a, x->spare, (size_t)x->count);
   pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
   pw_archive_bytes (a, x->direction, (size_t)x->count * sizeof *x->direction);
   pw_archive_bytes (a, x->bias, (size_t)x->count * sizeof *x->bias);

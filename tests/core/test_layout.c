@@ -21,15 +21,15 @@ LAYOUT (pw_signal_text, 32);
 LAYOUT (pw_body, 80);
 LAYOUT (pw_parameter, 48);
 LAYOUT (pw_run_defaults, 32);
-LAYOUT (pw_plugin_table, 88);
-LAYOUT (pw_field, 64);
+LAYOUT (pw_plugin_table, 96);
+LAYOUT (pw_field, 72);
 LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 312);
+LAYOUT (pw_kind, 328);
 LAYOUT (pw_path_place, 88);
-LAYOUT (pw_bounds, 48);
+LAYOUT (pw_bounds, 72);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -59,8 +59,8 @@ LAYOUT_AT (pw_plugin_table, about, 16);
 LAYOUT_AT (pw_plugin_table, parameters, 24);
 LAYOUT_AT (pw_plugin_table, parameters_size, 32);
 LAYOUT_AT (pw_plugin_table, run, 40);
-LAYOUT_AT (pw_plugin_table, build, 72);
-LAYOUT_AT (pw_plugin_table, reference, 80);
+LAYOUT_AT (pw_plugin_table, build, 80);
+LAYOUT_AT (pw_plugin_table, reference, 88);
 LAYOUT_AT (pw_field, offset, 8);
 LAYOUT_AT (pw_field, type, 16);
 LAYOUT_AT (pw_field, count, 20);
@@ -70,6 +70,7 @@ LAYOUT_AT (pw_field, domain, 36);
 LAYOUT_AT (pw_field, choices, 40);
 LAYOUT_AT (pw_field, about, 48);
 LAYOUT_AT (pw_field, given, 56);
+LAYOUT_AT (pw_field, limit, 64);
 LAYOUT_AT (pw_quantity, unit, 8);
 LAYOUT_AT (pw_quantity, rate, 16);
 LAYOUT_AT (pw_quantity, about, 24);
@@ -131,11 +132,17 @@ LAYOUT_AT (pw_kind, symbol, 280);
 LAYOUT_AT (pw_kind, limits, 288);
 LAYOUT_AT (pw_kind, exact, 296);
 LAYOUT_AT (pw_kind, is_exact, 304);
+LAYOUT_AT (pw_kind, companion, 312);
+LAYOUT_AT (pw_kind, has_companion, 320);
 LAYOUT_AT (pw_bounds, least, 0);
 LAYOUT_AT (pw_bounds, most, 8);
 LAYOUT_AT (pw_bounds, sliding, 16);
 LAYOUT_AT (pw_bounds, restitution, 32);
-LAYOUT_AT (pw_bounds, initially_slides, 40);
+LAYOUT_AT (pw_bounds, circle, 40);
+LAYOUT_AT (pw_bounds, initially_slides, 44);
+LAYOUT_AT (pw_bounds, signal, 48);
+LAYOUT_AT (pw_bounds, relative, 64);
+LAYOUT_AT (pw_bounds, partner, 68);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);
@@ -191,18 +198,18 @@ TEST (definitions) {
     { "pin", 0x2e992ed58a0ca1ea },           { "weld", 0x96d837462e580df9 },
     { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
     { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
-    { "stop", 0xf1ebca61e446368d },          { "rope", 0x63fe52bab6421076 },
-    { "contact", 0x1cfbb80a606b7611 },       { "freewheel", 0x1b30733283cdb584 },
-    { "drive", 0x7d987f91b3a3b54e },         { "wheel", 0xdd5a544c9423325 },
-    { "rolling-wheel", 0xbf6164e6564e8f84 }, { "steered-wheel", 0xb99994e5ef7cd001 },
-    { "speed", 0xc6449f5523558de9 },         { "pfaffian", 0x4cb2d7f5922ebd32 },
+    { "stop", 0x140184392f9eeb3b },          { "rope", 0x63fe52bab6421076 },
+    { "contact", 0x2b9104de018ef324 },       { "freewheel", 0x1b30733283cdb584 },
+    { "drive", 0x45d79783d2b25f96 },         { "wheel", 0x90c694b34d71482d },
+    { "rolling-wheel", 0xda3795bd8fe03e74 }, { "steered-wheel", 0x7ba6e6c35e716861 },
+    { "speed", 0x9365f9e484977d51 },         { "pfaffian", 0x21f7502885d757aa },
     { "tyre", 0xa42b832e02a24eda },          { "rolling-resistance", 0x267227c53db66752 },
     { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
-    { "friction", 0x823e8ce22a694f04 },      { "sliding-friction", 0x35363bbad0a93614 },
+    { "friction", 0xa97e80e22f2b94e4 },      { "sliding-friction", 0x6433eebc2ea7a54 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
-    { "force", 0xbc29b0bbfe5b6a71 },         { "on-curve", 0xc37960e01b745245 },
-    { "torque", 0xc52ae040b1e51021 },        { "motor", 0x4b2d8f0773cca89 },
-    { "state", 0x10002b44038fb8b8 },         { "marker", 0xa45ad3f1c6e75b4a },
+    { "force", 0xed655c437edc7bf9 },         { "on-curve", 0x4ddc6f3c234fa6d },
+    { "torque", 0x961e585e089c2f29 },        { "motor", 0xab802f17ba6b9811 },
+    { "state", 0xf095966fb52877f8 },         { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {

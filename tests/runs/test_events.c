@@ -42,7 +42,7 @@ static int events_read (void) {
       assert_int_equal (sscanf (line, "loss %lf", &p->loss), 1);
   }
   fclose (f);
-  assert_int_equal (events_count, 32);
+  assert_int_equal (events_count, 35);
   return 0;
 }
 
@@ -51,6 +51,11 @@ static int events_compared (const events_problem *p, const pw_event *event, int 
   const int ball = strcmp (p->scene, "ball") == 0 || strcmp (p->scene, "table") == 0;
   while (ball && count > 0 && event[count - 1].t > p->time[p->events - 1] + 1e-3) count--;
   return count;
+}
+
+/* 1 for contacts with friction. */
+static int events_rubs (const events_problem *p) {
+  return strcmp (p->scene, "rolling") == 0 || strcmp (p->scene, "rocking") == 0;
 }
 
 /* Runs a problem; returns the largest error of the times of its events, and checks the rest. */
@@ -117,6 +122,7 @@ TEST (all_methods) {
     const double bound = second ? 1e-4 : fixed ? 5e-8 : m->order > 0 ? 1e-7 : 2e-6;
     for (int k = 0; k < events_count; k++) {
       const events_problem *p = &events_problems[k];
+      if (strncmp (method, "leapfrog", 8) == 0 && events_rubs (p)) continue; /* which it refuses */
       if (k > 0 && strcmp (p->scene, p[-1].scene) == 0) continue;
       events_run (p, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10 }, bound,
                   second ? "(h k)^2, more where it drifts" : "errors of the method, 1e4 rtol of multistep ones");
@@ -154,7 +160,8 @@ SCENE (events_touching) {
                       .body = { both[0], both[1] },
                       .at = { { 0.1, 0.3 }, { -0.2, 0.4 } },
                       .heading = 0.5,
-                      .radius = 0.2 },
+                      .radius = 0.2,
+                      .mu = 0.3 },
              point = line, disc = line;
   pw_add_contact (m, &line);
   point.name = "P", point.radius = 0, point.body[0] = "ground";
