@@ -321,6 +321,67 @@ TEST (painleve) {
   runs_close (runs_open (s, "erk8+projection", NULL), s);
 }
 
+/* ---- Contacts beside wheels with a grip ---- */
+
+typedef struct {
+  double mu, rolls;
+} beside_parameters;
+
+static const pw_parameter beside_list[] = { { PW_AT (beside_parameters, mu), 0.2, "", "friction of the disc", PW_REAL },
+                                            { PW_AT (beside_parameters, rolls), 0, "", "1: rolling wheel", PW_REAL },
+                                            { .name = NULL } };
+
+SCENE_WITH (beside, beside_list, beside_parameters) {
+  const pw_signal grip = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 3, .offset = 0.3 } };
+  pw_add_body (
+      m, &(pw_body){
+             .name = "sled", .mass = 1, .inertia = 0.5, .rate = { 2, p->rolls != 0 ? 0 : 0.5, 2 }, .specified = 0x39 });
+  pw_add_body (
+      m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 0.005, .start = { 0, 10.1, 0 }, .rate = { 2, 0, 15 } });
+  if (p->rolls != 0)
+    pw_add_rolling_wheel (
+        m, &(pw_rolling_wheel){ .name = "R", .body = "sled", .radius = 0.1, .inertia = 0.01, .grip = grip });
+  else
+    pw_add_wheel (m, &(pw_wheel){ .name = "R", .body = "sled", .at = { -0.25 }, .grip = grip });
+  pw_add_force (m, &(pw_force){ .name = "weight", .body = "disc", .fy = { .constant = -9.81 } });
+  pw_add_contact (
+      m,
+      &(pw_contact){
+          .name = "floor", .body = { "disc", "ground" }, .at = { { 0, 0 }, { 0, 10 } }, .radius = 0.1, .mu = p->mu });
+}
+
+/* A limit that varies does not disturb the friction of a contact that slides, nor that friction the limit: the disc
+ * ends as if alone, rolling at (m v0 - I w0 / R) / (m + I / R^2) = 5/6 m/s, the sled as beside a smooth one. */
+TEST (limits_that_vary) {
+  static const char *const method[] = { "erk8+projection", "radau+ggl", "ida+ggl" };
+  for (int i = 0; i < 3; i++) {
+    double q[2][3];
+    for (int rough = 0; rough < 2; rough++) {
+      pw_system *s = scene_system (&beside_table, "mu", rough ? 0.2 : 0., NULL);
+      pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-10, .span = 2, .ledger = 1 });
+      const pw_sample x = runs_to (r, 2);
+      check_close (method[i], x.balance, 0, 1e-7, "losses are counted");
+      check_close (method[i], x.v[3], rough ? 5. / 6 : 2, 1e-7, "1e3 rtol");
+      memcpy (q[rough], x.q, sizeof q[rough]);
+      runs_close (r, s);
+    }
+    for (int j = 0; j < 3; j++) check_close (method[i], q[1][j], q[0][j], 1e-6, "1e4 rtol, different steps");
+  }
+}
+
+TEST (rolling_wheels_with_a_grip_are_refused) {
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&beside_table, "rolls", 1., NULL);
+  assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
+  assert_int_equal (error.status, PW_METHOD);
+  assert_non_null (strstr (error.text, "contact floor, "));
+  assert_non_null (strstr (error.text, "rolling-wheel R"));
+  assert_non_null (strstr (error.text, "friction of contacts together with grips of rolling wheels is not supported"));
+  pw_system_free (s);
+  s = scene_system (&beside_table, "rolls", 1., "mu", 0., NULL); /* without friction */
+  runs_close (runs_open (s, "rk4+projection", NULL), s);
+}
+
 /* ---- Random scenes: a block and a disc thrown on an inclined ground with a round obstacle and a wall ---- */
 
 static double contacts_random (unsigned *state) {
