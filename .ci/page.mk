@@ -14,7 +14,7 @@ all: $(PAGE)
 
 # The engine in WebAssembly: all that methods need which do not call SUNDIALS, without libraries.
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
-  -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8) PW_METHOD (radau) PW_METHOD (galpha) PW_METHOD (leapfrog)' \
+  -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8) PW_METHOD (radau) PW_METHOD (galpha) PW_METHOD (leapfrog) PW_METHOD (moreau)' \
   $(ALL) -iquote $(BUILD)/obj/core/cli/plot $(SYSTEM)
 WASM       := $(filter-out solvers/matrices/sparse.c solvers/run/ensemble.c solvers/analysis/% solvers/sundials/%,$(CORE) $(SOLVERS)) \
   $(addprefix core/files/,parser.c evaluation.c range.c yaml.c yaml_read.c yaml_signal.c yaml_expand.c yaml_unit.c yaml_text.c number.c json.c columns.c) $(addprefix core/cli/,json_print.c plot/plot_samples.c plot/plot_shapes.c plot/animate.c) \
@@ -26,6 +26,8 @@ $(BUILD)/wasm/%.o: %.c $(BUILD)/obj/core/cli/plot/animate.inc $(BUILD)/obj/core/
 	$(call say,WASM)
 	$(Q)$(WASM_CC) $(WASM_FLAGS) -MMD -MP -c $< -o $@
 $(BUILD)/wasm/core/specialise/%.o: WASM_FLAGS += -iquote $(BUILD)/obj/core/specialise
+# A page has at most 1 MB: only what a step calls is compiled for speed.
+$(BUILD)/wasm/core/files/%.o $(BUILD)/wasm/core/cli/%.o $(BUILD)/wasm/core/selftest/%.o $(BUILD)/wasm/core/specialise/%.o: WASM_FLAGS += -Oz
 -include $(WASM_OBJ:.o=.d)
 
 $(BUILD)/page/pinwheel-page.objects: $(WASM_OBJ)

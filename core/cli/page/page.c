@@ -10,8 +10,8 @@
 #include "page.inc"
 
 /* Integrators in the engine, which has no SUNDIALS. */
-static const char *const page_integrators[] = { "rk4", "erk5", "erk8", "radau", "galpha", "leapfrog", NULL };
-#define PAGE_METHODS "rk4, erk5, erk8, radau, galpha and leapfrog"
+static const char *const page_integrators[] = { "rk4", "erk5", "erk8", "radau", "galpha", "leapfrog", "moreau", NULL };
+#define PAGE_METHODS "rk4, erk5, erk8, radau, galpha, leapfrog and moreau"
 #define PAGE_INTEGRATOR "erk8" /* in place of one of the model with fixed steps, which takes longer */
 #define PAGE_METHOD PAGE_INTEGRATOR "+projection" /* in place of a method that has options or that the engine lacks */
 

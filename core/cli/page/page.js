@@ -466,7 +466,7 @@ function showValues () {
 /* One colour for each method; dashes by stabilisation. */
 const methodColours = ["#7a4f2a", "#cc6622", "#e0556a", "#b08a00", "#808080", "#2299bb", "#228833", "#66a61e",
   "#5b45c8", "#d35fc6", "#3a74b4", "#aa3377",
-  "#b01020", "#ff8c5a", "#d04a00", "#00a88f", "#57c7c0", "#8a7bd8"];
+  "#b01020", "#ff8c5a", "#d04a00", "#00a88f", "#57c7c0", "#8a7bd8", "#2f2f8f"];
 function methodPen (method) {
   const i = page.methods.findIndex(m => m.name === method);
   return { colour: methodColours[i % methodColours.length], dash: dashes[i % dashes.length], sign: dashSigns[i % dashes.length] };
