@@ -73,9 +73,9 @@ failed=
 scene () {
   name=$1
   shift
-  "$program" compare "$@" --methods all --specialise never --limit "$limit" --repeats "$repeats" -o "$work/$name" &&
+  "$program" compare "$@" --methods all --specialise never --limit "$limit" --repeats "$repeats" --plots "$work/$name" &&
     "$program" compare "$@" --methods "$specialised" --specialise always --limit "$limit" --repeats "$repeats" \
-      -o "$work/$name/specialised"
+      --plots "$work/$name/specialised"
 }
 
 # The original program held the torque constant over each step, projected with the pseudo-inverse, and summed its work

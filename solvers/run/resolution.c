@@ -185,7 +185,7 @@ static double resolution_size (pw_run *r, const pw_source *source) {
   for (int i = 1; i <= source->reads; i++) d->lo[i] = -DBL_MAX, d->hi[i] = DBL_MAX;
   pw_signal_bounds (source, d->lo, d->hi, bounds);
   const double size = fmax (fabs (bounds[0]), fabs (bounds[1]));
-  return size > 0 && size < 1e100 ? size : 1;
+  return size > 1e-100 && size < 1e100 ? size : 1; /* a signal of 0 has bounds next to 0 */
 }
 
 /* The longest step that a harmonic signal permits: half a period, if its effect in it exceeds the tolerance. */

@@ -125,4 +125,7 @@ TEST (notice) {
   assert_string_equal (cli_err, "pinwheel: 100 of 100 steps did not resolve force F: fx, which changes more within a "
                                 "step than the step sees: take shorter steps, or a method with adaptive ones\n");
   cli_good ("pinwheel run @/narrow.yaml -m rk4 --step 1e-4 -t 0.1");
+  cli_write ("narrow.yaml",
+             check_text (NARROW_BODY, "", "{drive: D, body: [b, ground], what: angle, value: 0*sin (9*t)}"));
+  cli_good ("pinwheel run @/narrow.yaml -m rk4 --step 1e-2 -t 0.1"); /* a signal of 0 changes nothing */
 }
