@@ -19,6 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "crossing.h"
+#include "decision.h"
 #include "events.h"
 #include "rank.h"
 #include "util.h"
@@ -42,9 +43,6 @@
 /* Distance of a multiplier [limits], or of u [units], from the boundary of a mode that is not round-off, nor that of
  * initial values with 6 digits. */
 #define EVENTS_BOUNDARY 1e-6
-#define DECISION_DEPENDENT 1e-11 /* squared sine of an equation that depends on others: it has a round-off of 1e-13 */
-enum { DECISION_MIXED = -2 };    /* number of solutions: friction of contacts and circles, which are not solved */
-enum { DECISION_MOST = 5000 };   /* combinations of modes that are tried, about a microsecond each */
 enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
 
 typedef struct pw_events {
@@ -60,7 +58,6 @@ typedef struct pw_events {
   int *partner;                         /* of friction: its normal equation; -1: none */
   int *place;                           /* in D; -1: not in it */
   unsigned char *enforced;              /* rows: what r->enforced points to */
-  unsigned char *blocked;               /* n: 1 for equations of a decision that depend on those that hold */
   unsigned char *other;                 /* rows: active equations of the saddle of a decision */
   double *start, *end, *previous, *now; /* 2 count: event functions at the ends of the last step, before it, anywhere */
   double start_t, previous_t;           /* NaN: not known */
@@ -78,16 +75,7 @@ typedef struct pw_events {
   int jumped;     /* 1: there was an impact in the last step */
   double *mean;   /* multipliers of the last step: its impulses over its length */
 
-  /* Of a decision: the equations D, by their number among those with limits. */
-  int n, *list;
-  double *A, *b, *x, *lo, *hi, *factor; /* n x n; n; factor: n (n + 1) */
-  double *towards;                      /* n: of circles at their limit, the direction of x */
-  int *held;                            /* n: those that hold */
-  int *on;              /* n: of friction the place of its normal equation, whose x its lo and hi multiply; -1: none */
-  unsigned char *fixed; /* n: 1: it slides at a velocity, its trial mode stays */
-  double *choice;       /* 3 n */
-  unsigned char *extra; /* n: 1: it depends on those that hold, and is left out */
-  signed char *trial;   /* n: modes */
+  pw_decision d;                  /* of the last decision; D: by their number among those with limits */
   double *f, *a, *gamma, *lambda; /* coords + 3; the same; rows; 2 rows */
 } pw_events;
 
@@ -96,15 +84,16 @@ static int events_allocate (pw_run *r) {
   const size_t n = (size_t)s->limited, rows = (size_t)s->rows, coords = (size_t)s->coords + 3;
   pw_events *x = r->events = pw_arena_alloc (&r->arena, sizeof *x);
   if (x == NULL) return PW_RESOURCE;
-  double **const number[] = { &x->force_unit, &x->unit, &x->u,     &x->u_before, &x->impulse,
-                              &x->offset,     &x->b,    &x->x,     &x->lo,       &x->hi,
-                              &x->direction,  &x->bias, &x->reach, &x->towards,  &x->mean };
+  double **const number[] = { &x->force_unit, &x->unit, &x->u,     &x->u_before,  &x->impulse,
+                              &x->offset,     &x->d.b,  &x->d.x,   &x->d.lo,      &x->d.hi,
+                              &x->direction,  &x->bias, &x->reach, &x->d.towards, &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
-  signed char **const mode[] = { &x->mode, &x->before, &x->trial };
-  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked, &x->spare, &x->fixed, &x->extra };
-  int **const index[] = { &x->row, &x->list, &x->held, &x->partner, &x->place, &x->on };
+  signed char **const mode[] = { &x->mode, &x->before, &x->d.trial };
+  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests,  &x->d.blocked,
+                                   &x->spare, &x->d.fixed,   &x->d.extra };
+  int **const index[] = { &x->row, &x->d.list, &x->d.held, &x->partner, &x->place, &x->d.on };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
-    x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
+    x->d.limit = x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
     for (size_t i = 0; i < sizeof number / sizeof *number; i++) *number[i] = pw_layout_alloc (&l, n, sizeof (double));
     for (int i = 0; i < 4; i++) *function[i] = pw_layout_alloc (&l, 2 * n, sizeof (double));
     for (int i = 0; i < 3; i++) *mode[i] = pw_layout_alloc (&l, n, 1);
@@ -114,9 +103,9 @@ static int events_allocate (pw_run *r) {
     r->coupling_memory = pw_layout_alloc (&l, 2 * coords + rows + n * (n + 1), sizeof (double));
     x->enforced = pw_layout_alloc (&l, rows, 1);
     x->other = pw_layout_alloc (&l, rows, 1);
-    x->choice = pw_layout_alloc (&l, 3 * n, sizeof *x->choice);
-    x->A = pw_layout_alloc (&l, n * n, sizeof *x->A);
-    x->factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->factor);
+    x->d.choice = pw_layout_alloc (&l, 3 * n, sizeof *x->d.choice);
+    x->d.A = pw_layout_alloc (&l, n * n, sizeof *x->d.A);
+    x->d.factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->d.factor);
     x->f = pw_layout_alloc (&l, coords, sizeof *x->f);
     x->a = pw_layout_alloc (&l, coords, sizeof *x->a);
     x->gamma = pw_layout_alloc (&l, rows, sizeof *x->gamma);
@@ -157,11 +146,6 @@ static void events_limits (pw_run *r) {
 /* 1 for friction of a contact that is open: it is off, whatever its mode. */
 static int events_apart (const pw_events *x, int i) {
   return x->partner[i] >= 0 && x->mode[x->partner[i]] != 0;
-}
-
-/* The sign of a multiplier that has one limit. */
-static int events_sign (const pw_bounds *limit) {
-  return isinf (limit->least) ? -1 : 1;
 }
 
 /* The mode of an equation that does not hold: of one with two finite limits by the sign of u. */
@@ -304,7 +288,7 @@ static void events_apply (pw_run *r) {
     off = 1;
     if (on >= 0 && x->mode[i] && !apart)
       r->coupling[r->couplings++] =
-          (pw_coupling){ x->row[i], x->row[on], events_given (x, i) * events_sign (&x->limit[on]) };
+          (pw_coupling){ x->row[i], x->row[on], events_given (x, i) * pw_limit_sign (&x->limit[on]) };
     if (x->stepping || (on < 0 && x->mode[i]))
       r->reaction[x->row[i]] = -(x->stepping ? x->mean[i] : events_given (x, i));
     if (!x->stepping && x->mode[i] && (r->s->limit_sources > 0 || x->limit[i].circle)) r->update_given = events_update;
@@ -404,15 +388,15 @@ static void decision_matrix (pw_run *r, pw_saddle *saddle) {
   pw_events *x = r->events;
   const pw_system *s = r->s;
   double *Ja = x->lambda + s->rows;
-  for (int k = 0; k < x->n; k++) {
+  for (int k = 0; k < x->d.n; k++) {
     memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
     memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
-    x->gamma[x->row[x->list[k]]] = 1;
+    x->gamma[x->row[x->d.list[k]]] = 1;
     pw_add_JT (r->w, x->gamma, x->f);
     memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
     pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
     pw_mul_J (r->w, x->a, Ja);
-    for (int i = 0; i < x->n; i++) x->A[i * x->n + k] = Ja[x->row[x->list[i]]];
+    for (int i = 0; i < x->d.n; i++) x->d.A[i * x->d.n + k] = Ja[x->row[x->d.list[i]]];
   }
 }
 
@@ -423,7 +407,7 @@ static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
   const pw_system *s = r->s;
   memcpy (x->other, x->enforced, (size_t)s->rows);
   for (int i = 0; i < x->count && impact; i++) x->other[x->row[i]] = 0;
-  for (int k = 0; k < x->n; k++) x->other[x->row[x->list[k]]] = 0;
+  for (int k = 0; k < x->d.n; k++) x->other[x->row[x->d.list[k]]] = 0;
   pw_saddle *saddle = pw_saddle_open (r->w, s->mass, s->rows, x->other, error);
   if (saddle == NULL || pw_saddle_factor (saddle) != PW_OK) return pw_saddle_close (saddle), NULL;
   if (impact) {
@@ -431,7 +415,7 @@ static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
     pw_evaluate_eta (r->w, x->gamma);
   } else {
     pw_evaluate_force (r->w, x->f);
-    for (int k = 0; k < x->n; k++) r->reaction[x->row[x->list[k]]] = 0; /* the unknowns */
+    for (int k = 0; k < x->d.n; k++) r->reaction[x->row[x->d.list[k]]] = 0; /* the unknowns */
     pw_add_JT (r->w, r->reaction, x->f);
     pw_evaluate_gamma (r->w, x->gamma);
     memcpy (x->lambda, x->gamma, (size_t)s->rows * sizeof *x->lambda);
@@ -439,7 +423,7 @@ static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
   }
   double *Ja = x->lambda + s->rows;
   pw_mul_J (r->w, x->a, Ja);
-  for (int k = 0; k < x->n; k++) x->b[k] = Ja[x->row[x->list[k]]] - x->gamma[x->row[x->list[k]]];
+  for (int k = 0; k < x->d.n; k++) x->d.b[k] = Ja[x->row[x->d.list[k]]] - x->gamma[x->row[x->d.list[k]]];
   decision_matrix (r, saddle);
   return saddle;
 }
@@ -450,250 +434,27 @@ static void decision_push (pw_run *r, pw_saddle *saddle, double *v) {
   const pw_system *s = r->s;
   memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
   memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
-  for (int k = 0; k < x->n; k++) x->gamma[x->row[x->list[k]]] = -x->x[k];
+  for (int k = 0; k < x->d.n; k++) x->gamma[x->row[x->d.list[k]]] = -x->d.x[k];
   pw_add_JT (r->w, x->gamma, x->f);
   memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
   pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
   for (int j = 0; j < s->coords; j++) v[j] += x->a[j];
 }
 
-/* 1 for friction whose contact is open: nothing is required of it. */
-static int decision_apart (const pw_events *x, int k) {
-  return x->on[k] >= 0 && x->trial[x->on[k]] != 0;
-}
-
-/* The multiplier of an equation at the limit of its trial mode; of friction as a multiple of the normal one. */
-static double decision_given (const pw_events *x, int k) {
-  const double limit = x->trial[k] > 0 ? x->hi[k] : x->lo[k];
-  if (x->limit[x->list[k]].circle) return limit * x->towards[k];
-  return x->on[k] < 0 ? limit : limit * events_sign (&x->limit[x->list[x->on[k]]]);
-}
-
-/* The matrix K and right-hand side y of z = 0 for the m equations x->held: x of those at limits are given, friction
- * that slides adds to the column of its normal equation. */
-static void decision_assemble (pw_events *x, int m, double *K, double *y) {
-  const int n = x->n;
-  for (int i = 0; i < m; i++) {
-    const double *row = x->A + x->held[i] * n;
-    y[i] = x->b[x->held[i]];
-    for (int j = 0; j < m; j++) {
-      K[i * m + j] = row[x->held[j]];
-      for (int k = 0; k < n; k++)
-        if (x->on[k] == x->held[j] && x->trial[k]) K[i * m + j] += row[k] * decision_given (x, k);
-    }
-    for (int k = 0; k < n; k++)
-      if (x->trial[k] && x->on[k] < 0) y[i] -= row[k] * x->x[k];
-  }
-}
-
-/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given.  Of equations that depend on each
- * other the later ones are left out, with x = 0, if they are friction or `skips` is 1; otherwise PW_RETRY. */
-static int decision_solve (pw_events *x, int skips) {
-  const int n = x->n;
-  int m = 0, *held = x->held;
-  for (int k = 0; k < n; k++) {
-    x->extra[k] = 0;
-    if (x->trial[k] == 0 && !decision_apart (x, k)) held[m++] = k;
-  }
-  double *K = x->factor, *y = K + m * m;
-  decision_assemble (x, m, K, y);
-  for (int i = 0; i < m; i++) {
-    if (!(fabs (K[i * m + i]) > DECISION_DEPENDENT * x->A[held[i] * n + held[i]])) {
-      if (!skips && x->on[held[i]] < 0) return PW_RETRY;
-      x->extra[held[i]] = 1, y[i] = 0;
-      for (int k = 0; k < m; k++) K[i * m + k] = K[k * m + i] = k == i;
-    }
-    for (int k = i + 1; k < m; k++) {
-      const double factor = K[k * m + i] / K[i * m + i];
-      for (int j = i; j < m; j++) K[k * m + j] -= factor * K[i * m + j];
-      y[k] -= factor * y[i];
-    }
-  }
-  for (int i = m - 1; i >= 0; i--) {
-    for (int j = i + 1; j < m; j++) y[i] -= K[i * m + j] * y[j];
-    x->x[held[i]] = y[i] /= K[i * m + i];
-  }
-  for (int k = 0; k < n; k++)
-    if (x->on[k] >= 0 && (x->trial[k] || decision_apart (x, k)))
-      x->x[k] = decision_apart (x, k) ? 0 : decision_given (x, k) * x->x[x->on[k]];
-  return PW_OK;
-}
-
-static double decision_z (const pw_events *x, int k) {
-  double z = x->b[k];
-  for (int i = 0; i < x->n; i++) z -= x->A[k * x->n + i] * x->x[i];
-  return z;
-}
-
-/* By how much equation k of D violates its conditions; *to: the mode that would satisfy them.  size: of z that are
- * round-off. */
-static double decision_violation (const pw_events *x, int k, double size, int *to) {
-  const double unit = sqrt (x->A[k * x->n + k]), scale = x->on[k] < 0 ? 1 : fabs (x->x[x->on[k]]);
-  const double hi = x->on[k] < 0 ? x->hi[k] : x->hi[k] * scale, lo = x->on[k] < 0 ? x->lo[k] : x->lo[k] * scale;
-  *to = x->x[k] > hi ? 1 : -1;
-  if (x->limit[x->list[k]].circle) return 0; /* decision_round */
-  if (x->fixed[k] || decision_apart (x, k)) return 0;
-  if (x->extra[k]) { /* it cannot hold if those on which it depends do not satisfy it */
-    const double z = decision_z (x, k) / unit;
-    *to = isinf (lo) || (!isinf (hi) && z > 0) ? 1 : -1;
-    return *to * z - 1e-9 * size;
-  }
-  if (x->trial[k] == 0) return unit * fmax (x->x[k] - hi, lo - x->x[k]);
-  *to = 0;
-  return -x->trial[k] * decision_z (x, k) / unit - 1e-12 * size;
-}
-
-static void decision_give (pw_events *x) {
-  for (int k = 0; k < x->n; k++)
-    if (x->trial[k] && x->on[k] < 0) x->x[k] = decision_given (x, k);
-}
-
-/* The size of z in units of each equation. */
-static double decision_size (const pw_events *x) {
-  double size = 0;
-  for (int k = 0; k < x->n; k++) {
-    const double unit = sqrt (x->A[k * x->n + k]);
-    size = fmax (size, fmax (fabs (x->b[k]) / unit, fabs (x->x[k]) * unit));
-  }
-  return size;
-}
-
-/* Finds x and trial modes between lo and hi, from the present trial modes on: the largest violation changes its mode;
- * after many changes, which may cycle, the first one (Murty).  An equation that depends on those that hold stays at its
- * limit, where it is satisfied, too; if `skips` is 1, it is left out.  PW_RETRY if that fails. */
-static int decision_pivot (pw_events *x, int skips) {
-  const int n = x->n;
-  int changed = -1, before = 0;
-  for (int k = 0; k < n; k++) x->blocked[k] = 0;
-  for (int pass = 0; pass < 50 * (n + 1); pass++) {
-    int worst = -1, to = 0, next = 0;
-    double most = 0;
-    decision_give (x);
-    if (decision_solve (x, skips) != PW_OK) {
-      if (changed < 0 || before == 0) return PW_RETRY;
-      x->trial[changed] = (signed char)before, x->blocked[changed] = 1;
-      continue;
-    }
-    const double size = decision_size (x);
-    for (int k = 0; k < n && (worst < 0 || pass < 10 * n); k++) {
-      const double violation = x->blocked[k] ? 0 : decision_violation (x, k, size, &next);
-      if (violation > most) most = violation, worst = k, to = next;
-    }
-    if (worst < 0) return PW_OK;
-    if (to != 0) memset (x->blocked, 0, (size_t)n);
-    changed = worst, before = x->trial[worst];
-    x->trial[worst] = (signed char)to;
-  }
-  return PW_RETRY;
-}
-
-/* A step towards the conditions of a circle with the equations k, k + 1 of D: x + z / trace (A) or, outside, the
- * nearest vector within the limit; inside, the equations hold.  Returns by how much the direction changes; > 1: its
- * mode does. */
-static double decision_round (pw_events *x, int k) {
-  double y[2], change = 0;
-  for (int m = 0; m < 2; m++) {
-    const double *row = x->A + (k + m) * x->n;
-    double z = x->b[k + m];
-    for (int i = 0; i < x->n; i++) z -= row[i] * x->x[i];
-    y[m] = x->x[k + m] + (x->trial[k] ? z / (x->A[k * x->n + k] + x->A[(k + 1) * x->n + k + 1]) : 0);
-  }
-  const double size = hypot (y[0], y[1]), most = x->hi[k] * (1 + (x->trial[k] ? -1 : 1) * 1e-13);
-  if (size <= most && (x->trial[k] == 0 || size == 0)) return 0;
-  if (size < most) return x->trial[k] = x->trial[k + 1] = 0, 2;
-  if (x->trial[k] == 0) change = 2;
-  for (int m = 0; m < 2; m++) {
-    change = fmax (change, fabs (y[m] / size - x->towards[k + m]));
-    x->towards[k + m] = y[m] / size, x->trial[k + m] = 1;
-  }
-  return change;
-}
-
-/* decision_pivot with circles: projected gradients in their multipliers (Goldstein 1964, Convex programming in Hilbert
- * space), exact in all others. */
-static int decision_minimum (pw_events *x) {
-  double before = INFINITY;
-  for (int pass = 0; pass < 10000; pass++) {
-    double change = 0;
-    const int status = decision_pivot (x, 0);
-    for (int k = 0; k < x->n && status == PW_OK; k++)
-      if (x->limit[x->list[k]].circle == 1) change = fmax (change, decision_round (x, k));
-    if (status != PW_OK || change == 0 || (change < 1e-12 && change >= before)) return status;
-    before = change;
-  }
-  return PW_RETRY;
-}
-
-/* The next combination of trial modes: of friction and two-sided limits 0, 1, -1, of one-sided ones 0 and their limit;
- * 0 after the last one. */
-static int decision_next (pw_events *x) {
-  for (int k = 0; k < x->n; k++) {
-    const signed char off = isinf (x->lo[k]) ? 1 : isinf (x->hi[k]) ? -1 : 0;
-    if (x->fixed[k] || (off == 0 && x->lo[k] == x->hi[k])) continue;
-    const signed char now = x->trial[k];
-    x->trial[k] = off ? (now ? 0 : off) : now == 0 ? 1 : now == 1 ? -1 : 0;
-    if (x->trial[k]) return 1;
-  }
-  return 0;
-}
-
-/* With friction that depends on reactions there may be no solution, or several.  All combinations of modes are tried;
- * different solutions differ in A x.  PW_OK: x and the trial modes are the only one; PW_RETRY: there is none, *count =
- * 0, or there are *count = 2; -1: not known, for too many equations.  found: 1 if x and the trial modes are one. */
-static int decision_enumerate (pw_events *x, int found, int *count) {
-  const int n = x->n;
-  double combinations = 1, *best = x->choice, *forces = best + n, *free_modes = forces + n;
-  for (int k = 0; k < n; k++) combinations *= x->fixed[k] ? 1 : isinf (x->lo[k]) || isinf (x->hi[k]) ? 2 : 3;
-  *count = -1;
-  if (combinations > DECISION_MOST) return found ? PW_OK : PW_RETRY;
-  *count = found;
-  double size = 0; /* of z without x */
-  for (int k = 0; k < n; k++) size = fmax (size, fabs (x->b[k]) / sqrt (x->A[k * n + k]));
-  for (int k = 0; k < n && found; k++) best[k] = x->x[k], free_modes[k] = x->trial[k], forces[k] = decision_z (x, k);
-  for (int k = 0; k < n; k++) x->trial[k] = x->fixed[k] ? x->trial[k] : 0;
-  do {
-    int to, good, same = 1;
-    decision_give (x);
-    (void)decision_solve (x, 1);
-    good = decision_size (x) < 1e6 * size; /* else of equations that nearly depend on each other */
-    for (int k = 0; k < n; k++) good &= decision_violation (x, k, size, &to) <= 1e-9 * size;
-    for (int k = 0; k<n && * count> 0; k++)
-      same &= fabs (decision_z (x, k) - forces[k]) <= 1e-6 * size * sqrt (x->A[k * n + k]);
-    if (!good || (*count > 0 && same)) continue;
-    if (++*count > 1) return PW_RETRY;
-    for (int k = 0; k < n; k++) best[k] = x->x[k], free_modes[k] = x->trial[k], forces[k] = decision_z (x, k);
-  } while (decision_next (x));
-  for (int k = 0; k < n && *count == 1; k++) x->trial[k] = (signed char)free_modes[k];
-  decision_give (x);
-  return *count == 1 ? decision_solve (x, 1) : PW_RETRY;
-}
-
-/* Solves the problem of a decision; *count: as above, -1 without friction that depends on reactions.  DECISION_MIXED:
- * there is such friction and a circle. */
-static int decide (pw_events *x, int *count) {
-  int coupled = 0, circles = 0;
-  for (int k = 0; k < x->n; k++) coupled |= x->on[k] >= 0, circles |= x->limit[x->list[k]].circle;
-  *count = coupled && circles ? DECISION_MIXED : -1;
-  if (!coupled) return decision_minimum (x);
-  if (circles) return PW_RETRY;
-  int status = decision_pivot (x, 0);
-  for (int k = 0; k < x->n && status != PW_OK; k++)
-    if (!x->fixed[k]) x->trial[k] = 0;
-  if (status != PW_OK) status = decision_pivot (x, 1);
-  return decision_enumerate (x, status == PW_OK, count);
-}
-
-/* count: of solutions, -1: not known, or DECISION_MIXED. */
+/* count: of solutions, -1: not known, or PW_DECISION_MIXED. */
 static int decision_fail (pw_run *r, pw_saddle *saddle, int count, pw_error *error) {
   pw_events *x = r->events;
   char elements[300];
   memset (x->other, 0, (size_t)r->s->rows);
-  for (int k = 0; k < x->n; k++) x->other[x->row[x->list[k]]] = 1;
+  for (int k = 0; k < x->d.n; k++) {
+    const pw_bounds *limit = &r->s->limit[x->row[x->d.list[k]]];
+    x->other[limit->relative ? limit->partner : x->row[x->d.list[k]]] = 1; /* a contact has one name for both */
+  }
   pw_list_elements (r->s, x->other, 1, elements, sizeof elements);
   if (saddle == NULL && error && error->status == PW_RESOURCE) return PW_RESOURCE;
   return pw_fail (error, PW_METHOD, "t = %.6g s: whether %s hold%s cannot be decided: %s", r->t, elements,
                   strchr (elements, ',') ? "" : "s",
-                  count == DECISION_MIXED
+                  count == PW_DECISION_MIXED
                       ? "friction of contacts together with grips of rolling wheels is not supported"
                   : count == 0 ? "with this friction there is no solution (Painleve)"
                   : count > 1  ? "with this friction there are several solutions (Painleve)"
@@ -708,17 +469,17 @@ static void impact_ledger (pw_run *r) {
   const pw_system *s = r->s;
   double *eta = x->lambda + s->rows;
   pw_evaluate_eta (r->w, eta);
-  for (int k = 0; k < x->n; k++) x->lambda[x->row[x->list[k]]] = x->x[k];
+  for (int k = 0; k < x->d.n; k++) x->lambda[x->row[x->d.list[k]]] = x->d.x[k];
   for (int i = 0; i < s->entries; i++) {
     const pw_element_batch *k = &s->batch[s->entry[i].batch];
     const int first = k->row + s->entry[i].element * k->kind->rows;
     const int normal = k->kind->rows > 0 && s->limit[first].relative ? s->limit[first].partner : -1;
     for (int row = first; row < first + k->kind->rows && s->entry[i].type == PW_WORK && !k->kind->power; row++)
       r->ledger[i] -= x->lambda[row] * eta[row];
-    for (int n = 0; n < x->n && s->entry[i].type == PW_LOSS; n++) {
-      const int e = x->list[n];
+    for (int n = 0; n < x->d.n && s->entry[i].type == PW_LOSS; n++) {
+      const int e = x->d.list[n];
       if ((x->row[e] >= first && x->row[e] < first + k->kind->rows) || x->row[e] == normal)
-        r->ledger[i] += 0.5 * x->x[n] * (x->u_before[e] + x->u[e]);
+        r->ledger[i] += 0.5 * x->d.x[n] * (x->u_before[e] + x->u[e]);
     }
   }
 }
@@ -735,10 +496,10 @@ static void impact_end (pw_run *r, const double *v) {
 
 /* Adds an equation to D, with the limits of its multiplier or, of friction, of the multiple of the normal one. */
 static void decide_add (pw_events *x, int i, double lo, double hi, signed char trial) {
-  const int k = x->n++;
-  x->list[k] = i, x->place[i] = k;
-  x->lo[k] = lo, x->hi[k] = hi, x->trial[k] = trial, x->fixed[k] = 0;
-  x->on[k] = x->partner[i] < 0 ? -1 : x->place[x->partner[i]];
+  const int k = x->d.n++;
+  x->d.list[k] = i, x->place[i] = k;
+  x->d.lo[k] = lo, x->d.hi[k] = hi, x->d.trial[k] = trial, x->d.fixed[k] = 0;
+  x->d.on[k] = x->partner[i] < 0 ? -1 : x->place[x->partner[i]];
 }
 
 /* 1 if a holonomic equation does not hold because g has left 0. */
@@ -750,16 +511,17 @@ static int events_open (const pw_run *r, int i, double g) {
 /* Impulses with the restitution of each equation times `part`; *loss: the energy that they dissipate.  After a motion
  * too short to be resolved, all these equations hold: it is the end of an accumulation, also of a block that rocks. */
 static int impact_try (pw_events *x, double part, int *count, double *loss) {
-  for (int k = 0; k < x->n; k++) {
-    const int i = x->list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
-    x->b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->on[k] < 0 ? part * x->limit[i].restitution : 0));
+  for (int k = 0; k < x->d.n; k++) {
+    const int i = x->d.list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
+    x->d.b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->d.on[k] < 0 ? part * x->limit[i].restitution : 0));
   }
-  for (int k = 0; k < x->n && x->fell; k++)
-    if (x->on[k] < 0) x->lo[k] = -INFINITY, x->hi[k] = INFINITY, x->trial[k] = 0;
-  const int status = x->fell ? decision_pivot (x, 1) : decide (x, count);
+  for (int k = 0; k < x->d.n && x->fell; k++)
+    if (x->d.on[k] < 0) x->d.lo[k] = -INFINITY, x->d.hi[k] = INFINITY, x->d.trial[k] = 0;
+  const int status = x->fell ? pw_decision_pivot (&x->d, 1) : pw_decide (&x->d, count);
   *loss = 0;
-  for (int k = 0; k < x->n; k++) *loss += x->x[k] * (x->u_before[x->list[k]] + decision_z (x, k) - x->b[k]) / 2;
-  for (int k = 0; k < x->n; k++) *loss += x->x[k] * x->u_before[x->list[k]] / 2;
+  for (int k = 0; k < x->d.n; k++)
+    *loss += x->d.x[k] * (x->u_before[x->d.list[k]] + pw_decision_z (&x->d, k) - x->d.b[k]) / 2;
+  for (int k = 0; k < x->d.n; k++) *loss += x->d.x[k] * x->u_before[x->d.list[k]] / 2;
   return status;
 }
 
@@ -769,7 +531,7 @@ static int impact_try (pw_events *x, double part, int *count, double *loss) {
 static int impact_solve (pw_events *x, int *count) {
   double loss, low = 0, high = 1, size = 0;
   int status = impact_try (x, 1, count, &loss);
-  for (int k = 0; k < x->n; k++) size += fabs (x->x[k] * x->u_before[x->list[k]]);
+  for (int k = 0; k < x->d.n; k++) size += fabs (x->d.x[k] * x->u_before[x->d.list[k]]);
   if (status != PW_OK || loss >= -1e-12 * size) return status;
   for (int i = 0; i < 40; i++) {
     const double part = (low + high) / 2;
@@ -784,7 +546,7 @@ static int impact_solve (pw_events *x, int *count) {
 /* Impacts: equations that do not hold, and whose u would leave its side.  *any: 1 if there are. */
 static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error) {
   pw_events *x = r->events;
-  *any = x->n = 0;
+  *any = x->d.n = 0;
   for (int i = 0; i < x->count; i++) x->place[i] = -1;
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
@@ -810,9 +572,9 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   pw_saddle_close (saddle);
   if (pw_update_velocities (r->w, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   impact_end (r, r->v);
-  for (int k = 0; k < x->n; k++) {
-    x->impulse[x->list[k]] = -x->x[k];
-    x->rests[x->list[k]] = fabs (x->u[x->list[k]]) <= EVENTS_SMALL * x->unit[x->list[k]];
+  for (int k = 0; k < x->d.n; k++) {
+    x->impulse[x->d.list[k]] = -x->d.x[k];
+    x->rests[x->d.list[k]] = fabs (x->u[x->d.list[k]]) <= EVENTS_SMALL * x->unit[x->d.list[k]];
   }
   return PW_OK;
 }
@@ -820,7 +582,7 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
 /* Lists D: equations that hold, and those whose u is 0.  jumps: 1 if velocities have jumped, or are initial ones. */
 static void decide_list (pw_run *r, const double *g, int jumps) {
   pw_events *x = r->events;
-  x->n = 0;
+  x->d.n = 0;
   for (int i = 0; i < x->count; i++) x->place[i] = -1;
   events_u (r, r->v, 0, x->u);
   for (int i = 0, equations; i < x->count; i += equations) {
@@ -846,7 +608,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
       else
         decide_add (x, k, fmin (0, x->limit[k].least + tighter), fmax (0, x->limit[k].most - tighter),
                     on < 0 ? x->mode[k] : 0);
-      x->fixed[x->n - 1] = (unsigned char)slides, x->towards[x->n - 1] = x->direction[k];
+      x->d.fixed[x->d.n - 1] = (unsigned char)slides, x->d.towards[x->d.n - 1] = x->direction[k];
     }
   }
   events_apply (r); /* forces of those outside D */
@@ -857,14 +619,14 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
  * multipliers exceed `known` by (NULL: 0). */
 static int decide_sliding (pw_events *x, double unit, const double *known, int *count) {
   for (int again = 1; again;) {
-    if (decide (x, count) != PW_OK) return PW_RETRY;
+    if (pw_decide (&x->d, count) != PW_OK) return PW_RETRY;
     again = 0;
-    for (int k = 0; k < x->n; k++) {
-      const int i = x->list[k];
+    for (int k = 0; k < x->d.n; k++) {
+      const int i = x->d.list[k];
       const double from = known ? known[i] : 0, *sliding = x->limit[i].sliding;
       const double lo = unit * (sliding[0] - from), hi = unit * (sliding[1] - from);
-      if (x->trial[k] > 0 && x->hi[k] > hi) x->hi[k] = hi, again = 1;
-      if (x->trial[k] < 0 && x->lo[k] < lo) x->lo[k] = lo, again = 1;
+      if (x->d.trial[k] > 0 && x->d.hi[k] > hi) x->d.hi[k] = hi, again = 1;
+      if (x->d.trial[k] < 0 && x->d.lo[k] < lo) x->d.lo[k] = lo, again = 1;
     }
   }
   return PW_OK;
@@ -873,22 +635,22 @@ static int decide_sliding (pw_events *x, double unit, const double *known, int *
 /* Decides the modes of D.  Their u becomes 0 exactly. */
 static int decide_modes (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
-  pw_saddle *saddle = x->n > 0 ? decision_open (r, 0, error) : NULL;
+  pw_saddle *saddle = x->d.n > 0 ? decision_open (r, 0, error) : NULL;
   int count = -1, status = saddle ? decide_sliding (x, 1, NULL, &count) : PW_OK;
-  if (x->n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, count, error);
-  for (int k = 0; k < x->n && status == PW_OK; k++) {
-    const int i = x->list[k], apart = decision_apart (x, k);
-    x->mode[i] = apart ? 1 : x->trial[k];
-    x->spare[i] = x->extra[k] && !apart;
-    x->direction[i] = x->towards[k];
+  if (x->d.n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, count, error);
+  for (int k = 0; k < x->d.n && status == PW_OK; k++) {
+    const int i = x->d.list[k], apart = pw_decision_apart (&x->d, k);
+    x->mode[i] = apart ? 1 : x->d.trial[k];
+    x->spare[i] = x->d.extra[k] && !apart;
+    x->direction[i] = x->d.towards[k];
     if (x->limit[i].circle == 1) circle_set_bias (r, i, 0);
   }
-  for (int k = 0; k < x->n && status == PW_OK; k++) {
-    x->on[k] = -1, x->trial[k] = (signed char)x->fixed[k];
-    x->x[k] = 0, x->b[k] = x->u[x->list[k]];
+  for (int k = 0; k < x->d.n && status == PW_OK; k++) {
+    x->d.on[k] = -1, x->d.trial[k] = (signed char)x->d.fixed[k];
+    x->d.x[k] = 0, x->d.b[k] = x->u[x->d.list[k]];
   }
-  if (x->n > 0 && status == PW_OK) {
-    (void)decision_solve (x, 1);
+  if (x->d.n > 0 && status == PW_OK) {
+    (void)pw_decision_solve (&x->d, 1);
     decision_push (r, saddle, r->v);
     if (pw_update_velocities (r->w, r->v) != PW_OK) status = pw_fail_signal (r->t, error);
   }
@@ -1325,7 +1087,7 @@ int pw_impulses_predict (pw_run *r) {
  * beginning of the step, those of velocities, and those of positions whose g has left its side. */
 static void impulses_list (pw_run *r, double h, const double *g) {
   pw_events *x = r->events;
-  x->n = x->jumped = 0;
+  x->d.n = x->jumped = 0;
   events_limits (r);
   for (int i = 0; i < x->count; i++) {
     const int side = events_off (x, i, 0), is_position = x->row[i] < r->s->holonomic;
@@ -1337,7 +1099,7 @@ static void impulses_list (pw_run *r, double h, const double *g) {
       x->jumped = 1;
       x->rests[i] = before > -EVENTS_SLOW || x->limit[i].restitution == 0;
     }
-    x->b[x->n] = x->u[i] + (x->rests[i] ? 0 : x->limit[i].restitution * x->u_before[i]);
+    x->d.b[x->d.n] = x->u[i] + (x->rests[i] ? 0 : x->limit[i].restitution * x->u_before[i]);
     decide_add (x, i, h * (x->limit[i].least - x->mean[i]), h * (x->limit[i].most - x->mean[i]), x->mode[i]);
   }
 }
@@ -1360,10 +1122,10 @@ int pw_impulses_solve (pw_run *r, pw_projector *p, double h, double t, const dou
   if (pw_update_velocities (r->w, v) != PW_OK) return pw_fail_signal (t, error);
   impact_end (r, v);
   for (int i = 0; i < x->count; i++) x->mode[i] = x->mode[i] ? x->mode[i] : events_off (x, i, 0);
-  for (int k = 0; k < x->n; k++) {
-    const int i = x->list[k];
-    x->mean[i] += x->x[k] / h;
-    x->mode[i] = x->rests[i] ? x->trial[k] : events_off (x, i, 0);
+  for (int k = 0; k < x->d.n; k++) {
+    const int i = x->d.list[k];
+    x->mean[i] += x->d.x[k] / h;
+    x->mode[i] = x->rests[i] ? x->d.trial[k] : events_off (x, i, 0);
   }
   events_apply (r);
   return PW_OK;
@@ -1373,13 +1135,13 @@ int pw_impulses_solve (pw_run *r, pw_projector *p, double h, double t, const dou
  * Returns 1 if one of them is violated. */
 static int impulses_violated (pw_run *r, const double *g) {
   pw_events *x = r->events;
-  int any = x->n = 0;
+  int any = x->d.n = 0;
   for (int i = 0; i < x->count && x->row[i] < r->s->holonomic; i++) {
     const int side = events_off (x, i, 0), holds = x->mode[i] == 0;
     const double off = (holds ? -fabs (g[i]) : side * g[i]) / x->unit[i];
     if (!holds && !(off < -EVENTS_SMALL)) continue;
     any |= off < -EVENTS_SMALL;
-    x->b[x->n] = g[i];
+    x->d.b[x->d.n] = g[i];
     decide_add (x, i, holds || side > 0 ? -INFINITY : 0, holds || side < 0 ? INFINITY : 0, 0);
   }
   return any;
@@ -1394,7 +1156,7 @@ int pw_impulses_project (pw_run *r, pw_projector *p, double t, double *q, const 
     if (!impulses_violated (r, x->now)) return PW_OK;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
     decision_matrix (r, p->position);
-    if (decision_pivot (x, 0) != PW_OK) return PW_RETRY;
+    if (pw_decision_pivot (&x->d, 0) != PW_OK) return PW_RETRY;
     decision_push (r, p->position, q);
   }
   return PW_RETRY;
