@@ -111,8 +111,8 @@ typedef struct {
   void (*range) (void *context, const double *lo, const double *hi, double bounds[2]);
   /* Conditions on states at which the value jumps or has a kink; the result is their number.  beyond NULL: fixes the
    * side of each for later calls of eval, to that of (t, x), so that they return a smooth function, also beyond; x
-   * NULL: ends that.  Otherwise stores how far (t, x) is beyond the fixed side of each one, negative on it.  Steps end
-   * where one becomes positive.  Needs `open`.  May be NULL. */
+   * NULL, too: ends that.  Otherwise stores how far (t, x) is beyond the fixed side of each one, negative on it, or
+   * nothing if x is NULL.  Steps end where one becomes positive.  Needs `open`.  May be NULL. */
   int (*sides) (void *context, double t, const double *x, double *beyond);
 } pw_function;
 

@@ -19,7 +19,7 @@ typedef enum {
   PW_OP_ROUND,
   PW_OP_TAN,
   PW_OP_FUNCTION_OF_ONE, /* a smooth function of one argument */
-  PW_OP_PATH_AT,         /* a function of the place of a path at an arc length */
+  PW_OP_PATH_AT,         /* a function of the point of a path at an arc length */
   PW_OP_ADD,
   PW_OP_SUBTRACT,
   PW_OP_MULTIPLY,
@@ -38,7 +38,7 @@ typedef enum {
   PW_OP_HYPOT,
   PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
   PW_OP_SELECT,          /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
-  PW_OP_PATH_NEAREST     /* a function of the place of a path nearest to a point; the third operand: pw_path_nearest */
+  PW_OP_PATH_NEAREST     /* a function of the point of a path nearest to a point; the third operand: pw_path_nearest */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {
@@ -55,7 +55,7 @@ static inline int pw_expression_has_path (int op) {
   return op == PW_OP_PATH_AT || op == PW_OP_PATH_NEAREST;
 }
 
-/* Whether it has jumps, poles or kinks. */
+/* Whether an operation has jumps, poles or kinks. */
 static inline int pw_expression_breaks (int op) {
   return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX || op == PW_OP_TAN ||
          op == PW_OP_DIVIDE || op == PW_OP_POWER || op == PW_OP_HYPOT;
@@ -98,7 +98,7 @@ typedef struct {
 
 extern const pw_expression_function pw_expression_functions[]; /* and constants; ends with a NULL name */
 
-/* A function of a place of a path: pw_expression_code.index. */
+/* A function of a point of a path: pw_expression_code.index. */
 typedef enum { PW_PATH_S, PW_PATH_X, PW_PATH_Y, PW_PATH_HEADING, PW_PATH_CURVATURE, PW_PATH_OFFSET } pw_path_function;
 extern const char *const pw_path_functions[]; /* their names, in this order; ends with NULL */
 
@@ -107,10 +107,10 @@ int pw_expression_find_function (const char *name);
 
 /* ---- Evaluation ---- */
 
-/* The value of operations; *may_jump becomes 1 if one of them may jump there: at equal numbers, at poles. */
+/* The value of operations; *may_jump becomes 1 if one of them may jump there, as at equal numbers or poles. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump);
 
-/* The value of an operation of `right` alone or of `left` and `right`, other than functions of the nearest place. */
+/* The value of an operation of `right` alone or of `left` and `right`, other than functions of the nearest point. */
 double pw_expression_apply (const pw_expression_code *c, double left, double right);
 
 /* As pw_expression_derivatives.  discrete, unless NULL, receives for each operation a number that differs on the two

@@ -97,7 +97,7 @@ static int location_follow (location *p) {
   return 0;
 }
 
-/* 0 or an errno value. */
+/* Finds the location that a path means, through its links.  0 or an errno value. */
 static int locate (location *p, const char *path) {
   *p = (location){ .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
   pw_path (p->path, "%s", path);
@@ -180,7 +180,7 @@ int pw_check_paths (const pw_use *use, int count, pw_error *error) {
 
 enum { LOCK_TRIES = 100 }; /* when other processes create and remove the file at the same time */
 
-/* 0 or an errno value.  File systems without locks give no protection. */
+/* Locks an open file without waiting.  0, also on file systems without locks, or an errno value. */
 static int lock_acquire (int file) {
   while (flock (file, LOCK_EX | LOCK_NB) != 0) {
     if (errno == ENOLCK || errno == EOPNOTSUPP || errno == ENOSYS) return 0;
@@ -189,7 +189,7 @@ static int lock_acquire (int file) {
   return 0;
 }
 
-/* Of an errno value, for messages. */
+/* The reason for messages, from an errno value of pw_lock_file. */
 static const char *lock_reason (int code) {
   return code == EWOULDBLOCK ? "another process is writing it"
          : code == ELOOP     ? "its temporary name is a symbolic link"
@@ -283,7 +283,7 @@ static int output_fail (const pw_output *o, int code, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (o, code));
 }
 
-/* The same, and names the temporary file, if that remains. */
+/* As output_fail; also names the temporary file if it remains. */
 static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
   if (*o->part == 0 || o->discard) return output_fail (o, code, error);
   return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
@@ -313,8 +313,8 @@ static int output_open_direct (pw_output *o, const location *p) {
   return output_stream_of (o, file, "w");
 }
 
-/* Gives the new file owner and group of the old one, or the group alone, as permitted, and its mode; without the owner
- * no set-user-ID bit, without the group no set-group-ID bit either. */
+/* Gives the new file the owner and group of the old one, or the group alone, as permitted, and its mode.  Without the
+ * owner there is no set-user-ID bit, without the group no set-group-ID bit either. */
 static int output_inherit (int file, const struct stat *old) {
   struct stat now;
   if (fstat (file, &now) != 0) return errno;
@@ -520,9 +520,9 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 
 /* ---- Continuation of an interrupted run ---- */
 
+enum { OUTPUT_CHECKED = 65536 }; /* bytes */
 /* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter or
  * cannot be read. */
-enum { OUTPUT_CHECKED = 65536 };
 static int output_checksum (int file, pw_mark *mark) {
   char bytes[OUTPUT_CHECKED];
   size_t size = mark->length < sizeof bytes ? (size_t)mark->length : sizeof bytes;

@@ -1,5 +1,5 @@
-/* Files of code: finds, compiles and loads models; makes the files of interactive pages; compiles and loads specialised
- * scenes. */
+/* Model files and compiled code: finds, compiles and loads models, collects the files of interactive pages, and
+ * compiles, caches and loads specialised scenes. */
 #define _GNU_SOURCE /* dladdr1 */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -129,6 +129,7 @@ static int search_folder (search *s, const char *folder, pw_error *error) {
   return status;
 }
 
+/* Adds the models in the folders of PINWHEEL_MODELS. */
 static int search_environment (search *s, pw_error *error) {
   const char *list = getenv ("PINWHEEL_MODELS");
   if (list == NULL) return PW_OK;
@@ -600,7 +601,7 @@ static int page_text (pw_page *p, const pw_file *f, pw_error *error) {
   pw_stream_close (to, &tree);
   if (page_add (p, "tree", tree.text, tree.size, error) != PW_OK || status != PW_OK) return PW_RESOURCE;
   status = pw_yaml_tables (y, 0, page_table, &x);
-  return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */
+  return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* or the reason already recorded */
 }
 
 int pw_page_open (pw_page *p, const pw_file *f, pw_error *error) {
@@ -749,7 +750,7 @@ struct pw_scene_code {
   char notice[PW_PATH + 600];
 };
 
-/* The object to load. */
+/* The specialised code to load: its source, and the paths of its files. */
 typedef struct {
   const pw_system *system;
   int lanes;        /* 0: for single runs */
@@ -790,7 +791,7 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
   return status == PW_INPUT && *text == NULL && errno == ENOENT ? PW_RETRY : status;
 }
 
-/* Stores a text as the source, followed by version, options, compiler and checksum of pinwheel.h. */
+/* Stores a text as the source, followed by version, options, compiler and checksum of pinwheel.h, and its key. */
 static int code_source (code_job *x, const char *text, pw_error *error) {
   char header[PW_PATH], *bytes = NULL, *compiler = strdup (build_compiler ());
   size_t size;
@@ -915,7 +916,8 @@ static int code_make (code_job *x, pw_error *error) {
   return status;
 }
 
-/* Uses a temporary folder after failures that the cache may have caused, as by the deletion of KEY.c. */
+/* Loads the object from the cache, or compiles it there.  Uses a temporary folder if there is no cache, or after a
+ * failure that it may have caused, as by the deletion of KEY.c. */
 static int code_open (code_job *x, pw_error *error) {
   pw_error cause = { 0 };
   if (cache_folder (x->folder, x->code->notice, sizeof x->code->notice)) {

@@ -23,7 +23,7 @@ __extension__ typedef unsigned __int128 number_wide;
 
 enum { POWER_LEAST = -292, POWER_MOST = 324, POWER_WORDS = 28 };
 
-/* The first 128 bits of 10^k, rounded up, as { low, high }: those of 5^k 2^128, or of 2^864 / 5^-k. */
+/* The first 128 bits of 10^k, rounded up, as { low, high }.  5^k has the same: x is 5^k 2^128 or 2^864 / 5^-k. */
 static const uint64_t *number_power (int k) {
   static _Thread_local uint64_t known[POWER_MOST - POWER_LEAST + 1][2];
   uint64_t *power = known[k - POWER_LEAST];
@@ -49,13 +49,13 @@ static const uint64_t *number_power (int k) {
   return power;
 }
 
-/* The upper 64 bits of power x, and 1 in the last one if more than round-off follows. */
+/* The upper 64 bits of power * x, rounded to odd: the last bit is also 1 if more than round-off has been cut off. */
 static uint64_t number_product (const uint64_t *power, uint64_t x) {
   number_wide low = (number_wide)power[0] * x, high = (number_wide)power[1] * x + (low >> 64);
   return (uint64_t)(high >> 64) | ((uint64_t)high > 1);
 }
 
-/* floor (log10 (2^q)), or of 3/4 2^q; floor (log2 (10^k)).  Exact for exponents of doubles. */
+/* floor (log10 (2^q)), or with 3/4 2^q in place of 2^q; floor (log2 (10^k)).  Exact for exponents of doubles. */
 static int number_log10 (int q, int three_quarters) {
   return (q * 1262611 - (three_quarters ? 524031 : 0)) >> 22;
 }
@@ -63,14 +63,14 @@ static int number_log2 (int k) {
   return (k * 1741647) >> 19;
 }
 
-/* The shortest decimal m 10^*e, of these the nearest one, that is nearer to `value` than to any other double; m may end
- * with zeros.  value: positive and finite. */
+/* The shortest decimal m 10^*e that is nearer to `value`, positive and finite, than to any other double; of several the
+ * nearest one.  Returns m, which may end with zeros. */
 static uint64_t number_decimal (double value, int *e) {
   uint64_t bits;
   memcpy (&bits, &value, sizeof bits);
   const uint64_t fraction = bits & (UINT64_MAX >> 12);
   const int exponent = (int)(bits >> 52), closer_below = fraction == 0 && exponent > 1;
-  const int q = (exponent ? exponent : 1) - 1075;
+  const int q = (exponent ? exponent : 1) - 1075; /* value = c 2^q */
   const uint64_t c = exponent ? fraction | 1ULL << 52 : fraction, odd = c & 1;
   *e = 0;
   if (q <= 0 && q > -53 && (c & ((1ULL << -q) - 1)) == 0) return c >> -q; /* an integer */
@@ -89,7 +89,7 @@ static uint64_t number_decimal (double value, int *e) {
   return m + (middle > 4 * m + 2 || (middle == 4 * m + 2 && (m & 1)));
 }
 
-/* As by "%.17g", except for digits beyond the shortest ones.  value: finite. */
+/* Prints a finite value as "%.17g" does, but with the fewest digits that read back as the same number. */
 static void number_shortest (char *to, double value) {
   char reversed[20];
   int e = 0, count = 0, zeros;

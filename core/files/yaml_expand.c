@@ -9,8 +9,8 @@
 
 /* ---- Copies ----
  *
- * A copy differs from the entry in the texts with braces alone, "link{i - 1}": the entry is copied once, with a list of
- * these texts, which are replaced for each copy. */
+ * Copies differ only in texts with braces, such as "link{i - 1}".  The entry is therefore copied once, with a list of
+ * these texts.  For each value of the counter only they are replaced. */
 
 enum { COPY_TEXT = 4000 /* bytes of a text with braces, at most */ };
 #define COPY_NUMBER 1e9 /* largest number in braces */
@@ -60,6 +60,7 @@ static int copy_part_read (pw_copies *c, const pw_node *source, const char **res
   return status;
 }
 
+/* Adds a text with braces to the list. */
 static int copy_text (pw_copies *c, const pw_node *source, pw_node *node) {
   struct pw_copy_text *t = pw_arena_alloc (c->arena, sizeof *t);
   copy_part **to = t ? &t->first : NULL;
@@ -76,7 +77,7 @@ static int copy_text (pw_copies *c, const pw_node *source, pw_node *node) {
   return status;
 }
 
-/* Copies the nodes from one on, except the pair of the key `repeat`, into a list or map. */
+/* Copies `from` and the nodes after it, except the key `repeat` and its value, to the list *to. */
 static int copy_nodes (pw_copies *c, const pw_node *from, pw_node **to) {
   int status = PW_OK;
   for (const pw_node *n = from; n && status == PW_OK; n = n->next) {
@@ -116,7 +117,7 @@ int pw_copies_open (pw_copies *c, const pw_node *entry) {
 }
 
 int pw_copies_set (pw_copies *c, int i) {
-  char text[4 * COPY_TEXT]; /* a number of at most 11 bytes replaces at least 3 */
+  char text[4 * COPY_TEXT]; /* at most 11 bytes of a number replace at least 3, "{i}" */
   c->i = i;
   for (const struct pw_copy_text *t = c->text; t; t = t->next) {
     char *end = text;
@@ -252,7 +253,7 @@ static int include_file (pw_yaml *y, pw_node *node, const level *up, size_t max_
   return include_all (y, node, &(level){ up, path, up->depth + 1 }, max_bytes, error);
 }
 
-/* Reads the files in the list `include` of a file; what is not as expected is reported later. */
+/* Reads the files in the list `include` of a file.  Reading the elements reports malformed entries later. */
 static int include_all (pw_yaml *y, const pw_node *root, const level *up, size_t max_bytes, pw_error *error) {
   for (const pw_node *key = root && root->type == PW_YAML_MAP ? root->first : NULL; key; key = key->next->next) {
     const pw_node *list = key->next;

@@ -17,6 +17,7 @@ enum {
 typedef struct {
   uint64_t state; /* initially the seed */
 } pw_random;
+/* The next one, uniformly distributed in [low, high). */
 double pw_random_between (pw_random *r, double low, double high);
 
 /* Compiles a scene of bodies b0 to b3 and elements e0 to e2, which form its only batch, with random definitions within

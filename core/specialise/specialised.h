@@ -6,9 +6,9 @@
 
 #define PW_SCENE_ABI 6
 enum { PW_STAGES_MOST = 16 }; /* most stages of a Runge-Kutta method */
-/* Least pivot of a constraint equation in the elimination of J M^-1 J^T, relative to its diagonal entry there: the
- * squared sine of the angle between its row of J and those eliminated before, in the metric of M^-1.  Its root is
- * pw_thresholds.refine: the code does not refine solutions. */
+/* Least pivot of a constraint equation in the elimination of J M^-1 J^T, relative to its diagonal entry: the squared
+ * sine of the angle between its row of J and the rows eliminated before, in the metric of M^-1.  The sine is that below
+ * which the general engine refines solutions (pw_thresholds.refine), which this code does not. */
 #define PW_SCENE_PIVOT 4e-4
 
 /* A run's data for specialised code. */

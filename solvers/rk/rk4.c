@@ -2,7 +2,7 @@
 #include "rk.h"
 
 static const double rk4_c[] = { 0, 0.5, 0.5, 1 };
-static const double rk4_A[] = { 0.5, 0, 0.5, 0, 0, 1 };
+static const double rk4_A[] = { 0.5, 0, 0.5, 0, 0, 1 }; /* by rows, below the diagonal */
 static const double rk4_b[] = { 1. / 6, 1. / 3, 1. / 3, 1. / 6 };
 static const pw_tableau rk4_tableau = { .stages = 4, .c = rk4_c, .A = rk4_A, .b = rk4_b };
 

@@ -1,25 +1,25 @@
-/* Decisions: multipliers within limits, some of which are multiples of others (friction), or limit a resultant
- * (circles); see events.c. */
+/* Decisions: linear complementarity problems with two-sided limits (events.c).  The limits of friction of a contact are
+ * multiples of the normal multiplier.  A circle limits the resultant of two multipliers. */
 #include <math.h>
 #include <string.h>
 #include "decision.h"
 
-#define DECISION_DEPENDENT 1e-11 /* squared sine of an equation that depends on others: it has a round-off of 1e-13 */
-enum { DECISION_MOST = 5000 };   /* combinations of modes that are tried, about a microsecond each */
+#define DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
+enum { DECISION_MOST = 5000 };   /* combinations of modes that are tried, at about a microsecond each */
 
 int pw_decision_apart (const pw_decision *d, int k) {
-  return d->on[k] >= 0 && d->trial[d->on[k]] != 0;
+  return d->normal[k] >= 0 && d->trial[d->normal[k]] != 0;
 }
 
-/* The multiplier of an equation at the limit of its trial mode; of friction as a multiple of the normal one. */
+/* The given multiplier of an equation at the limit of its trial mode; for friction, the factor of the normal one. */
 static double decision_given (const pw_decision *d, int k) {
   const double limit = d->trial[k] > 0 ? d->hi[k] : d->lo[k];
   if (d->limit[d->list[k]].circle) return limit * d->towards[k];
-  return d->on[k] < 0 ? limit : limit * pw_limit_sign (&d->limit[d->list[d->on[k]]]);
+  return d->normal[k] < 0 ? limit : limit * pw_limit_sign (&d->limit[d->list[d->normal[k]]]);
 }
 
-/* The matrix K and right-hand side y of z = 0 for the m equations d->held: x of those at limits are given, friction
- * that slides adds to the column of its normal equation. */
+/* The system K x = y that states z = 0 for the m equations d->held.  Given multipliers are moved to y.  Friction that
+ * slides is a multiple of its normal multiplier: it adds to that column. */
 static void decision_assemble (pw_decision *d, int m, double *K, double *y) {
   const int n = d->n;
   for (int i = 0; i < m; i++) {
@@ -28,10 +28,10 @@ static void decision_assemble (pw_decision *d, int m, double *K, double *y) {
     for (int j = 0; j < m; j++) {
       K[i * m + j] = row[d->held[j]];
       for (int k = 0; k < n; k++)
-        if (d->on[k] == d->held[j] && d->trial[k]) K[i * m + j] += row[k] * decision_given (d, k);
+        if (d->normal[k] == d->held[j] && d->trial[k]) K[i * m + j] += row[k] * decision_given (d, k);
     }
     for (int k = 0; k < n; k++)
-      if (d->trial[k] && d->on[k] < 0) y[i] -= row[k] * d->x[k];
+      if (d->trial[k] && d->normal[k] < 0) y[i] -= row[k] * d->x[k];
   }
 }
 
@@ -39,15 +39,15 @@ int pw_decision_solve (pw_decision *d, int skips) {
   const int n = d->n;
   int m = 0, *held = d->held;
   for (int k = 0; k < n; k++) {
-    d->extra[k] = 0;
+    d->redundant[k] = 0;
     if (d->trial[k] == 0 && !pw_decision_apart (d, k)) held[m++] = k;
   }
   double *K = d->factor, *y = K + m * m;
   decision_assemble (d, m, K, y);
-  for (int i = 0; i < m; i++) {
+  for (int i = 0; i < m; i++) { /* Gaussian elimination: without friction K is positive semidefinite */
     if (!(fabs (K[i * m + i]) > DECISION_DEPENDENT * d->A[held[i] * n + held[i]])) {
-      if (!skips && d->on[held[i]] < 0) return PW_RETRY;
-      d->extra[held[i]] = 1, y[i] = 0;
+      if (!skips && d->normal[held[i]] < 0) return PW_RETRY;
+      d->redundant[held[i]] = 1, y[i] = 0;
       for (int k = 0; k < m; k++) K[i * m + k] = K[k * m + i] = k == i;
     }
     for (int k = i + 1; k < m; k++) {
@@ -61,8 +61,8 @@ int pw_decision_solve (pw_decision *d, int skips) {
     d->x[held[i]] = y[i] /= K[i * m + i];
   }
   for (int k = 0; k < n; k++)
-    if (d->on[k] >= 0 && (d->trial[k] || pw_decision_apart (d, k)))
-      d->x[k] = pw_decision_apart (d, k) ? 0 : decision_given (d, k) * d->x[d->on[k]];
+    if (d->normal[k] >= 0 && (d->trial[k] || pw_decision_apart (d, k)))
+      d->x[k] = pw_decision_apart (d, k) ? 0 : decision_given (d, k) * d->x[d->normal[k]];
   return PW_OK;
 }
 
@@ -72,15 +72,15 @@ double pw_decision_z (const pw_decision *d, int k) {
   return z;
 }
 
-/* By how much equation k of D violates its conditions; *to: the mode that would satisfy them.  size: of z that are
- * round-off. */
+/* By how much equation k violates its conditions, in the units of decision_size; *to: the mode that would satisfy them.
+ * size: decision_size, of which round-off is no violation. */
 static double decision_violation (const pw_decision *d, int k, double size, int *to) {
-  const double unit = sqrt (d->A[k * d->n + k]), scale = d->on[k] < 0 ? 1 : fabs (d->x[d->on[k]]);
-  const double hi = d->on[k] < 0 ? d->hi[k] : d->hi[k] * scale, lo = d->on[k] < 0 ? d->lo[k] : d->lo[k] * scale;
+  const double unit = sqrt (d->A[k * d->n + k]), scale = d->normal[k] < 0 ? 1 : fabs (d->x[d->normal[k]]);
+  const double hi = d->normal[k] < 0 ? d->hi[k] : d->hi[k] * scale, lo = d->normal[k] < 0 ? d->lo[k] : d->lo[k] * scale;
   *to = d->x[k] > hi ? 1 : -1;
-  if (d->limit[d->list[k]].circle) return 0; /* decision_round */
+  if (d->limit[d->list[k]].circle) return 0; /* decision_step_on_circle */
   if (d->fixed[k] || pw_decision_apart (d, k)) return 0;
-  if (d->extra[k]) { /* it cannot hold if those on which it depends do not satisfy it */
+  if (d->redundant[k]) { /* it holds only if the equations on which it depends imply z = 0 */
     const double z = pw_decision_z (d, k) / unit;
     *to = isinf (lo) || (!isinf (hi) && z > 0) ? 1 : -1;
     return *to * z - 1e-9 * size;
@@ -90,12 +90,13 @@ static double decision_violation (const pw_decision *d, int k, double size, int 
   return -d->trial[k] * pw_decision_z (d, k) / unit - 1e-12 * size;
 }
 
-static void decision_give (pw_decision *d) {
+/* Sets the given multipliers, except those of friction, which pw_decision_solve sets. */
+static void decision_set_given (pw_decision *d) {
   for (int k = 0; k < d->n; k++)
-    if (d->trial[k] && d->on[k] < 0) d->x[k] = decision_given (d, k);
+    if (d->trial[k] && d->normal[k] < 0) d->x[k] = decision_given (d, k);
 }
 
-/* The size of z in units of each equation. */
+/* The largest |z| and |x|, made comparable by the factor sqrt (A_kk) of each equation. */
 static double decision_size (const pw_decision *d) {
   double size = 0;
   for (int k = 0; k < d->n; k++) {
@@ -107,14 +108,14 @@ static double decision_size (const pw_decision *d) {
 
 int pw_decision_pivot (pw_decision *d, int skips) {
   const int n = d->n;
-  int changed = -1, before = 0;
+  int changed = -1, before = 0; /* the last equation that changed its mode, and its mode before */
   for (int k = 0; k < n; k++) d->blocked[k] = 0;
   for (int pass = 0; pass < 50 * (n + 1); pass++) {
     int worst = -1, to = 0, next = 0;
     double most = 0;
-    decision_give (d);
+    decision_set_given (d);
     if (pw_decision_solve (d, skips) != PW_OK) {
-      if (changed < 0 || before == 0) return PW_RETRY;
+      if (changed < 0 || before == 0) return PW_RETRY; /* else it depends on those that hold: back to its limit */
       d->trial[changed] = (signed char)before, d->blocked[changed] = 1;
       continue;
     }
@@ -124,17 +125,17 @@ int pw_decision_pivot (pw_decision *d, int skips) {
       if (violation > most) most = violation, worst = k, to = next;
     }
     if (worst < 0) return PW_OK;
-    if (to != 0) memset (d->blocked, 0, (size_t)n);
+    if (to != 0) memset (d->blocked, 0, (size_t)n); /* fewer hold: others may be independent now */
     changed = worst, before = d->trial[worst];
     d->trial[worst] = (signed char)to;
   }
   return PW_RETRY;
 }
 
-/* A step towards the conditions of a circle with the equations k, k + 1 of D: x + z / trace (A) or, outside, the
- * nearest vector within the limit; inside, the equations hold.  Returns by how much the direction changes; > 1: its
- * mode does. */
-static double decision_round (pw_decision *d, int k) {
+/* A projected-gradient step for the circle of the equations k, k + 1: y = x + z / trace (A), of their diagonal block.
+ * If y is within the limit, both hold from now on.  Otherwise x has the direction of y and the length of the limit.
+ * Returns the change of the direction, or 2 if the mode changes. */
+static double decision_step_on_circle (pw_decision *d, int k) {
   double y[2], change = 0;
   for (int m = 0; m < 2; m++) {
     const double *row = d->A + (k + m) * d->n;
@@ -153,24 +154,24 @@ static double decision_round (pw_decision *d, int k) {
   return change;
 }
 
-/* pw_decision_pivot with circles: projected gradients in their multipliers (Goldstein 1964, Convex programming in
- * Hilbert space), exact in all others. */
-static int decision_minimum (pw_decision *d) {
+/* Solves a problem without friction of contacts, a convex minimum: projected gradients for circles (Goldstein 1964,
+ * Convex programming in Hilbert space), alternating with pw_decision_pivot for the other equations. */
+static int decision_minimise (pw_decision *d) {
   double before = INFINITY;
   for (int pass = 0; pass < 10000; pass++) {
     double change = 0;
     const int status = pw_decision_pivot (d, 0);
     for (int k = 0; k < d->n && status == PW_OK; k++)
-      if (d->limit[d->list[k]].circle == 1) change = fmax (change, decision_round (d, k));
+      if (d->limit[d->list[k]].circle == 1) change = fmax (change, decision_step_on_circle (d, k));
     if (status != PW_OK || change == 0 || (change < 1e-12 && change >= before)) return status;
     before = change;
   }
   return PW_RETRY;
 }
 
-/* The next combination of trial modes: of friction and two-sided limits 0, 1, -1, of one-sided ones 0 and their limit;
- * 0 after the last one. */
-static int decision_next (pw_decision *d) {
+/* Sets the next combination of trial modes: 0, 1, -1 with two limits, as of friction; 0 and the limit with one.  0
+ * after the last combination. */
+static int decision_next_modes (pw_decision *d) {
   for (int k = 0; k < d->n; k++) {
     const signed char off = isinf (d->lo[k]) ? 1 : isinf (d->hi[k]) ? -1 : 0;
     if (d->fixed[k] || (off == 0 && d->lo[k] == d->hi[k])) continue;
@@ -181,46 +182,46 @@ static int decision_next (pw_decision *d) {
   return 0;
 }
 
-/* With friction that depends on reactions there may be no solution, or several.  All combinations of modes are tried;
- * different solutions differ in A x.  PW_OK: x and the trial modes are the only one; PW_RETRY: there is none, *count =
- * 0, or there are *count = 2; -1: not known, for too many equations.  found: 1 if x and the trial modes are one. */
+/* Tries all combinations of modes: friction that depends on reactions may have no solution, or several (Painleve).
+ * Solutions count as different if A x differs.  found: 1 if x and the trial modes are a solution already.  PW_OK: they
+ * are the only one.  PW_RETRY: *count solutions, 0 or 2.  *count = -1: not known, too many combinations. */
 static int decision_enumerate (pw_decision *d, int found, int *count) {
   const int n = d->n;
-  double combinations = 1, *best = d->choice, *forces = best + n, *free_modes = forces + n;
+  double combinations = 1, *kept_z = d->choice, *kept_modes = kept_z + n;
   for (int k = 0; k < n; k++) combinations *= d->fixed[k] ? 1 : isinf (d->lo[k]) || isinf (d->hi[k]) ? 2 : 3;
   *count = -1;
   if (combinations > DECISION_MOST) return found ? PW_OK : PW_RETRY;
   *count = found;
   double size = 0; /* of z without x */
   for (int k = 0; k < n; k++) size = fmax (size, fabs (d->b[k]) / sqrt (d->A[k * n + k]));
-  for (int k = 0; k < n && found; k++) best[k] = d->x[k], free_modes[k] = d->trial[k], forces[k] = pw_decision_z (d, k);
+  for (int k = 0; k < n && found; k++) kept_modes[k] = d->trial[k], kept_z[k] = pw_decision_z (d, k);
   for (int k = 0; k < n; k++) d->trial[k] = d->fixed[k] ? d->trial[k] : 0;
   do {
     int to, good, same = 1;
-    decision_give (d);
+    decision_set_given (d);
     (void)pw_decision_solve (d, 1);
-    good = decision_size (d) < 1e6 * size; /* else of equations that nearly depend on each other */
+    good = decision_size (d) < 1e6 * size; /* else the equations that hold nearly depend on each other */
     for (int k = 0; k < n; k++) good &= decision_violation (d, k, size, &to) <= 1e-9 * size;
-    for (int k = 0; k<n && * count> 0; k++)
-      same &= fabs (pw_decision_z (d, k) - forces[k]) <= 1e-6 * size * sqrt (d->A[k * n + k]);
+    for (int k = 0; *count > 0 && k < n; k++)
+      same &= fabs (pw_decision_z (d, k) - kept_z[k]) <= 1e-6 * size * sqrt (d->A[k * n + k]);
     if (!good || (*count > 0 && same)) continue;
     if (++*count > 1) return PW_RETRY;
-    for (int k = 0; k < n; k++) best[k] = d->x[k], free_modes[k] = d->trial[k], forces[k] = pw_decision_z (d, k);
-  } while (decision_next (d));
-  for (int k = 0; k < n && *count == 1; k++) d->trial[k] = (signed char)free_modes[k];
-  decision_give (d);
+    for (int k = 0; k < n; k++) kept_modes[k] = d->trial[k], kept_z[k] = pw_decision_z (d, k);
+  } while (decision_next_modes (d));
+  for (int k = 0; k < n && *count == 1; k++) d->trial[k] = (signed char)kept_modes[k];
+  decision_set_given (d);
   return *count == 1 ? pw_decision_solve (d, 1) : PW_RETRY;
 }
 
 int pw_decide (pw_decision *d, int *count) {
   int coupled = 0, circles = 0;
-  for (int k = 0; k < d->n; k++) coupled |= d->on[k] >= 0, circles |= d->limit[d->list[k]].circle;
+  for (int k = 0; k < d->n; k++) coupled |= d->normal[k] >= 0, circles |= d->limit[d->list[k]].circle;
   *count = coupled && circles ? PW_DECISION_MIXED : -1;
-  if (!coupled) return decision_minimum (d);
+  if (!coupled) return decision_minimise (d);
   if (circles) return PW_RETRY;
   int status = pw_decision_pivot (d, 0);
   for (int k = 0; k < d->n && status != PW_OK; k++)
     if (!d->fixed[k]) d->trial[k] = 0;
-  if (status != PW_OK) status = pw_decision_pivot (d, 1);
+  if (status != PW_OK) status = pw_decision_pivot (d, 1); /* again, without redundant equations */
   return decision_enumerate (d, status == PW_OK, count);
 }

@@ -89,9 +89,9 @@ static int events_allocate (pw_run *r) {
                               &x->direction,  &x->bias, &x->reach, &x->d.towards, &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
   signed char **const mode[] = { &x->mode, &x->before, &x->d.trial };
-  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests,  &x->d.blocked,
-                                   &x->spare, &x->d.fixed,   &x->d.extra };
-  int **const index[] = { &x->row, &x->d.list, &x->d.held, &x->partner, &x->place, &x->d.on };
+  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests,      &x->d.blocked,
+                                   &x->spare, &x->d.fixed,   &x->d.redundant };
+  int **const index[] = { &x->row, &x->d.list, &x->d.held, &x->partner, &x->place, &x->d.normal };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
     x->d.limit = x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
     for (size_t i = 0; i < sizeof number / sizeof *number; i++) *number[i] = pw_layout_alloc (&l, n, sizeof (double));
@@ -103,7 +103,7 @@ static int events_allocate (pw_run *r) {
     r->coupling_memory = pw_layout_alloc (&l, 2 * coords + rows + n * (n + 1), sizeof (double));
     x->enforced = pw_layout_alloc (&l, rows, 1);
     x->other = pw_layout_alloc (&l, rows, 1);
-    x->d.choice = pw_layout_alloc (&l, 3 * n, sizeof *x->d.choice);
+    x->d.choice = pw_layout_alloc (&l, 2 * n, sizeof *x->d.choice);
     x->d.A = pw_layout_alloc (&l, n * n, sizeof *x->d.A);
     x->d.factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->d.factor);
     x->f = pw_layout_alloc (&l, coords, sizeof *x->f);
@@ -499,7 +499,7 @@ static void decide_add (pw_events *x, int i, double lo, double hi, signed char t
   const int k = x->d.n++;
   x->d.list[k] = i, x->place[i] = k;
   x->d.lo[k] = lo, x->d.hi[k] = hi, x->d.trial[k] = trial, x->d.fixed[k] = 0;
-  x->d.on[k] = x->partner[i] < 0 ? -1 : x->place[x->partner[i]];
+  x->d.normal[k] = x->partner[i] < 0 ? -1 : x->place[x->partner[i]];
 }
 
 /* 1 if a holonomic equation does not hold because g has left 0. */
@@ -513,10 +513,10 @@ static int events_open (const pw_run *r, int i, double g) {
 static int impact_try (pw_events *x, double part, int *count, double *loss) {
   for (int k = 0; k < x->d.n; k++) {
     const int i = x->d.list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
-    x->d.b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->d.on[k] < 0 ? part * x->limit[i].restitution : 0));
+    x->d.b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->d.normal[k] < 0 ? part * x->limit[i].restitution : 0));
   }
   for (int k = 0; k < x->d.n && x->fell; k++)
-    if (x->d.on[k] < 0) x->d.lo[k] = -INFINITY, x->d.hi[k] = INFINITY, x->d.trial[k] = 0;
+    if (x->d.normal[k] < 0) x->d.lo[k] = -INFINITY, x->d.hi[k] = INFINITY, x->d.trial[k] = 0;
   const int status = x->fell ? pw_decision_pivot (&x->d, 1) : pw_decide (&x->d, count);
   *loss = 0;
   for (int k = 0; k < x->d.n; k++)
@@ -641,12 +641,12 @@ static int decide_modes (pw_run *r, pw_error *error) {
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     const int i = x->d.list[k], apart = pw_decision_apart (&x->d, k);
     x->mode[i] = apart ? 1 : x->d.trial[k];
-    x->spare[i] = x->d.extra[k] && !apart;
+    x->spare[i] = x->d.redundant[k] && !apart;
     x->direction[i] = x->d.towards[k];
     if (x->limit[i].circle == 1) circle_set_bias (r, i, 0);
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
-    x->d.on[k] = -1, x->d.trial[k] = (signed char)x->d.fixed[k];
+    x->d.normal[k] = -1, x->d.trial[k] = (signed char)x->d.fixed[k];
     x->d.x[k] = 0, x->d.b[k] = x->u[x->d.list[k]];
   }
   if (x->d.n > 0 && status == PW_OK) {

@@ -1,9 +1,9 @@
-/* Signals that change within less than a step: what the stages of a method do not see, its error estimate does not see
- * either.  Steps are limited so that they see it.
+/* Signals that change within less than a step.  The stages of a method may miss such a change; then its error estimate
+ * misses it as well.  Steps are limited so that they see it.
  *
- * A time H is resolved if the signal's deviation from the straight lines through its values at the beginning, the
- * middle and the end is at most a quarter of the largest difference of these, or has no effect: H times the deviation
- * changes velocities by less than the tolerance.  The deviation is bounded by interval arithmetic, in parts that are
+ * The next time H is resolved if the signal deviates little from the chords through its values at 0, H / 2 and H: by at
+ * most a quarter of the largest difference of neighbouring values, or so little that H times the deviation changes
+ * velocities by less than a tenth of the tolerance.  The deviation is bounded by interval arithmetic, in parts that are
  * halved while the bound is too large (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 6).
  * States that the signal reads are predicted by the velocities and accelerations of the state reached.
  *
@@ -15,20 +15,19 @@
 #include "resolution.h"
 #include "util.h"
 
-#define RESOLUTION_SEEN 0.25   /* deviation over the largest difference of the values seen */
-#define RESOLUTION_SHARE 0.1   /* of the tolerance, by which a step may miss what a signal does */
-#define RESOLUTION_FIXED 1e-6  /* the tolerance of fixed steps */
-#define RESOLUTION_LEAST 1e-10 /* of the span: shorter times are not examined: the bounds are too wide */
-#define RESOLUTION_NARROWER \
-  0.75                         /* widths of bounds of a half over that of the whole, at most, where nothing is narrow */
-enum { RESOLUTION_DEPTH = 3 }; /* most halvings of a part */
-enum { RESOLUTION_AHEAD = 16 }; /* fixed steps examined at once */
+#define RESOLUTION_SEEN 0.25     /* largest deviation over the difference of the values seen */
+#define RESOLUTION_SHARE 0.1     /* of the tolerance: change of velocities that a step may miss */
+#define RESOLUTION_FIXED 1e-6    /* relative tolerance with fixed steps */
+#define RESOLUTION_LEAST 1e-10   /* of the span: if this time is not resolved, bounds are too wide to tell */
+#define RESOLUTION_NARROWER 0.75 /* largest width of the bounds in a half over that in the whole (resolution_is_near) */
+enum { RESOLUTION_DEPTH = 3 };   /* most halvings of a part */
+enum { RESOLUTION_AHEAD = 16 };  /* number of fixed steps that are examined at once */
 
 typedef struct {
   const pw_source *source;
   pw_source at;   /* the same, evaluated away from the state reached */
   double effect;  /* acceleration [velocity units / s] per unit of the signal; 0: unknown */
-  double size;    /* largest value, if bounds of it are known, else 1 */
+  double size;    /* largest magnitude, if bounds of it are known, else 1 */
   double longest; /* time last resolved */
   double end;     /* until which the signal is resolved in this sense; INFINITY: it is not examined */
 } resolution_signal;
@@ -44,7 +43,7 @@ struct pw_resolution {
 
 /* ---- Values and bounds at the time t + s ---- */
 
-/* State j, as in pw_source.state. */
+/* The prediction of state j, an index as in pw_source.state. */
 static double resolution_state (const pw_run *r, int j, double s) {
   const int n = r->s->coords;
   return j < n ? r->q[j] + s * (r->v[j] + 0.5 * s * r->a[j]) : r->v[j - n] + s * r->a[j - n];
@@ -70,9 +69,9 @@ static void resolution_bounds (pw_run *r, const resolution_signal *x, double a, 
   pw_signal_bounds (&x->at, d->lo, d->hi, bounds);
 }
 
-/* 1 if the deviation from the line from ya at a to yb at b is proved to be at most `most`, or bounds are unknown.  In
- * the smallest parts the value in the middle decides, if bounds of both halves are narrower in proportion: they are too
- * wide, as of a difference of numbers that change alike, but there is nothing narrow. */
+/* 1 if the deviation from the chord from ya at a to yb at b is proved to be at most `most`, or bounds are unknown.
+ * Bounds may be too wide, as of a difference of numbers that change alike.  In the smallest parts the value in the
+ * middle therefore decides, if bounds shrink with the interval; those of a narrow peak would not. */
 static int resolution_is_near (pw_run *r, resolution_signal *x, double a, double b, double ya, double yb, double most,
                                int depth) {
   double bounds[2];
@@ -93,16 +92,17 @@ static int resolution_is_near (pw_run *r, resolution_signal *x, double a, double
 
 /* ---- The time that is resolved ---- */
 
+/* 1 if the next time H is resolved. */
 static int resolution_resolved (pw_run *r, resolution_signal *x, double H) {
   const double m = H / 2, y0 = resolution_value (r, x, 0), y1 = resolution_value (r, x, m),
                y2 = resolution_value (r, x, H), rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol;
-  const double missed = RESOLUTION_SHARE * rtol * (x->effect > 0 ? 1 / (x->effect * H) : x->size);
-  const double most = fmax (missed, RESOLUTION_SEEN * fmax (fabs (y1 - y0), fabs (y2 - y1)));
+  const double harmless = RESOLUTION_SHARE * rtol * (x->effect > 0 ? 1 / (x->effect * H) : x->size);
+  const double most = fmax (harmless, RESOLUTION_SEEN * fmax (fabs (y1 - y0), fabs (y2 - y1)));
   return resolution_is_near (r, x, 0, m, y0, y1, most, RESOLUTION_DEPTH) &&
          resolution_is_near (r, x, m, H, y1, y2, most, RESOLUTION_DEPTH);
 }
 
-/* The time from r->t on that is resolved, halved from `longest` to `least`; 0: not even that is. */
+/* The first of `longest`, its half, quarter, ... down to `least` that is resolved; 0: none is. */
 static double resolution_find (pw_run *r, resolution_signal *x, double longest, double least) {
   for (double H = longest;; H = fmax (H / 2, least)) {
     if (resolution_resolved (r, x, H)) return H;
@@ -110,7 +110,7 @@ static double resolution_find (pw_run *r, resolution_signal *x, double longest, 
   }
 }
 
-/* Examines the signal from the state reached on; before: length of the last step. */
+/* Finds until when the signal is resolved, from the state reached on; before: length of the last step. */
 static void resolution_examine (pw_run *r, resolution_signal *x, double before) {
   const double remaining = r->breakpoint - r->t, predicted = x->at.reads > 0 ? 0 : 2 * x->longest;
   const double growth = r->method->order > 0 ? 2 : 10; /* multistep methods lose their order if they grow slowly */
@@ -122,7 +122,7 @@ static void resolution_examine (pw_run *r, resolution_signal *x, double before) 
   if (x->longest > 0) return;
   if (r->fixed_steps)
     r->resolution->missed = x->source;
-  else /* its bounds are too wide */
+  else /* its bounds are too wide: it does not limit steps until then */
     x->end = x->at.reads > 0 ? r->t + ahead : INFINITY, x->longest = ahead;
 }
 
@@ -153,7 +153,7 @@ char *pw_run_unresolved (const pw_run *r, char *signal, size_t size) {
   const struct pw_resolution *d = r->resolution;
   *signal = 0;
   if (d == NULL || r->statistics.unresolved == 0 || d->missed == NULL) return signal;
-  r->w->failed = d->missed;
+  r->w->failed = d->missed; /* which pw_failed_signal names */
   pw_failed_signal (r->w, signal, size);
   r->w->failed = failed;
   return signal;
@@ -161,8 +161,8 @@ char *pw_run_unresolved (const pw_run *r, char *signal, size_t size) {
 
 /* ---- Opening ---- */
 
-/* The largest acceleration, in units of velocities per second, by a unit of a force's signal: without constraints,
- * which reduce it (Gauss' principle).  0: unknown. */
+/* The largest acceleration [velocity units / s] per unit of a force's signal; 0: unknown.  Constraints are left out:
+ * they can only reduce it (Gauss' principle). */
 static double resolution_effect (pw_run *r, const pw_source *source) {
   const pw_system *s = r->s;
   double *f = r->scratch, *changed = f + s->coords + 3, most = 0;
@@ -178,6 +178,7 @@ static double resolution_effect (pw_run *r, const pw_source *source) {
   return most < INFINITY ? most : 0;
 }
 
+/* The largest magnitude of a signal in all states during the run; 1: unknown. */
 static double resolution_size (pw_run *r, const pw_source *source) {
   struct pw_resolution *d = r->resolution;
   double bounds[2];
@@ -188,7 +189,7 @@ static double resolution_size (pw_run *r, const pw_source *source) {
   return size > 1e-100 && size < 1e100 ? size : 1; /* a signal of 0 has bounds next to 0 */
 }
 
-/* The longest step that a harmonic signal permits: half a period, if its effect in it exceeds the tolerance. */
+/* The longest step that a harmonic signal permits: half a period, or longer if its effect is within the tolerance. */
 static double resolution_harmonic (pw_run *r, const pw_source *source) {
   const double rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol, effect = resolution_effect (r, source);
   const double A = fabs (source->signal.harmonic.amplitude), half = PW_PI / fabs (source->signal.harmonic.omega);

@@ -1,10 +1,11 @@
-/* Conditions on states in signals: comparisons, abs, floor and others (evaluation.c).
+/* Conditions on states at which signals jump or have kinks: comparisons, abs, floor and others (evaluation.c).  Their
+ * switching functions are negative on the side of a condition that is fixed, and positive beyond.
  *
- * In a step their sides are fixed, so that accelerations are smooth and the method keeps its order, also where its
- * stages lie beyond a condition.  After the step the first time at which one is beyond its side is located in the dense
- * output.  The state there becomes the state reached, the sides are fixed anew, and the method restarts.  Where
- * accelerations on both sides lead back to the condition, there is no motion but along it (Filippov 1988, Differential
- * Equations with Discontinuous Righthand Sides): the run stops. */
+ * In a step all sides are fixed.  Accelerations are then smooth and the method keeps its order, even if stages lie
+ * beyond a condition.  After the step the first root is located in the dense output.  The state there becomes the state
+ * reached, the sides are fixed anew, and the method restarts.  If accelerations on both sides lead back to the
+ * condition, the motion could only slide along it (Filippov 1988, Differential Equations with Discontinuous Righthand
+ * Sides): the run stops. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,12 +15,12 @@
 #include "sides.h"
 #include "util.h"
 
-#define SIDES_SLIDE 1e-9      /* times [T] after which a condition that has changed returns without having left */
-#define SIDES_DIFFERENCE 1e-6 /* of the step, for the rates of conditions */
+#define SIDES_SLIDE 1e-9      /* [T] a condition that would return to its root within this time slides along it */
+#define SIDES_DIFFERENCE 1e-6 /* of the step, for rates of switching functions by forward differences */
 
 /* ---- Values ---- */
 
-/* How far a state is beyond the sides. */
+/* Stores the switching functions at a state. */
 static void sides_evaluate (pw_run *r, double t, const double *q, const double *v, double *beyond) {
   for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
     double *state = r->sides->read;
@@ -32,7 +33,7 @@ static void sides_evaluate (pw_run *r, double t, const double *q, const double *
   }
 }
 
-/* The same at the state reached, and the rates [1/s] there. */
+/* The same at the state reached, and their rates there. */
 static void sides_evaluate_rates (pw_run *r, double h, double *beyond, double *rate) {
   const double s = SIDES_DIFFERENCE * h, t = pw_before_breakpoint (r, r->t);
   double *q = r->scratch, *v = q + r->s->coords + 3;
@@ -42,8 +43,8 @@ static void sides_evaluate_rates (pw_run *r, double h, double *beyond, double *r
   for (int i = 0; i < r->sides->count; i++) rate[i] = (rate[i] - beyond[i]) / s;
 }
 
-/* pw_crossing_search.at.  Keeps the first sample that is beyond a side: another one at its time may differ by the
- * tolerance, since methods interpolate between samples (rk.c). */
+/* pw_crossing_search.at.  Keeps the earliest sample beyond a side.  It must not be computed again: methods interpolate
+ * between samples (rk.c), so that a second one at its time may differ by the tolerance. */
 static int sides_at (void *context, double t, double *value, pw_error *error) {
   pw_run *r = context;
   pw_sides *x = r->sides;
@@ -64,7 +65,7 @@ static int sides_at (void *context, double t, double *value, pw_error *error) {
 
 /* ---- Steps ---- */
 
-/* The condition i: its signal. */
+/* The signal that has condition i. */
 static const pw_source *sides_source (const pw_run *r, int i) {
   const pw_source *x = r->w->source;
   for (;; x++) {
@@ -100,7 +101,7 @@ int pw_sides_begin (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-/* 1 if no condition comes near the other side: by four times the deviation of the cubic from its chord. */
+/* 1 if no cubic of the end values and rates comes near 0: `bend` is four times its deviation from the chord or more. */
 static int sides_far (const pw_sides *x, double h) {
   for (int i = 0; i < x->count; i++) {
     const double chord = x->end[i] - x->start[i];
@@ -110,7 +111,7 @@ static int sides_far (const pw_sides *x, double h) {
   return 1;
 }
 
-/* Makes the sample found the state reached, or leaves the end of the step if that is the first one beyond a side. */
+/* Makes the earliest sample beyond a side the state reached, unless that is the end of the step. */
 static void sides_stop (pw_run *r) {
   pw_sides *x = r->sides;
   const double *beyond = x->found.t < r->t ? x->now : x->end;
@@ -139,7 +140,7 @@ int pw_sides_follow (pw_run *r, double t0, pw_error *error) {
   const double root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
   if (search.status != PW_OK) return search.status;
   if (!isnan (root)) sides_stop (r);
-  pw_forget_residuals (r);
+  pw_forget_residuals (r); /* the search has evaluated other states */
   if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (r->t == x->found.t) pw_ledger_rates (r, r->lambda, r->rate);
   return PW_OK;

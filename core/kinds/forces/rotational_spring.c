@@ -10,45 +10,45 @@
 
 typedef struct {
   double stiffness, damping, free_angle; /* k [N m/rad], c [N m s/rad], beta [rad] */
-} twist;
+} torsion;
 
 typedef struct {
-  const twist *element;
+  const torsion *element;
   double angle, rate; /* phi1 - phi2 - beta, omega1 - omega2 */
-} twist_state;
+} torsion_state;
 
-static inline twist_state twist_at (const pw_batch *batch, int e) {
-  const twist *element = (const twist *)batch->element + e;
+static inline torsion_state torsion_at (const pw_batch *batch, int e) {
+  const torsion *element = (const torsion *)batch->element + e;
   const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
-  return (twist_state){ element, body1->phi - body2->phi - element->free_angle, body1->omega - body2->omega };
+  return (torsion_state){ element, body1->phi - body2->phi - element->free_angle, body1->omega - body2->omega };
 }
 
-PREPARE (twist_prepare, pw_rotational_spring, twist) {
-  *element = (twist){ definition->stiffness, definition->damping, definition->angle };
+PREPARE (torsion_prepare, pw_rotational_spring, torsion) {
+  *element = (torsion){ definition->stiffness, definition->damping, definition->angle };
   return PW_OK;
 }
 
-PER_ELEMENT (twist_force, twist, 6) {
+PER_ELEMENT (torsion_force, torsion, 6) {
   opposite_moments (-(now.element->stiffness * now.angle + now.element->damping * now.rate), out);
 }
 
-PER_ELEMENT (twist_force_q, twist, 36) {
+PER_ELEMENT (torsion_force_q, torsion, 36) {
   opposite_moments_block (now.element->stiffness, out);
 }
 
-PER_ELEMENT (twist_force_v, twist, 36) {
+PER_ELEMENT (torsion_force_v, torsion, 36) {
   opposite_moments_block (now.element->damping, out);
 }
 
-PER_ELEMENT (twist_energy, twist, 1) {
+PER_ELEMENT (torsion_energy, torsion, 1) {
   *out = now.element->stiffness * now.angle * now.angle / 2;
 }
 
-PER_ELEMENT (twist_loss, twist, 1) {
+PER_ELEMENT (torsion_loss, torsion, 1) {
   *out = now.element->damping * now.rate * now.rate;
 }
 
-static const pw_field twist_fields[] = {
+static const pw_field torsion_fields[] = {
   { PW_AT (pw_rotational_spring, body), PW_BODY, .count = 2, .required = 1,
     .about = "the two bodies; one may be ground" },
   { PW_AT (pw_rotational_spring, stiffness), PW_NUMBER, .unit = "N m/rad", .required = 1, .domain = PW_NONNEGATIVE,
@@ -64,9 +64,9 @@ const pw_kind pw_kind_rotational_spring = {
   .name = "rotational-spring",
   .about = "a torsion spring and a parallel damper between two bodies",
   .symbol = "0 .4 0 0 .3 .4 0 -.2 .5 0 -.6 0 0 -.3 -.7 0 .4 -.8 0 .9 0 0 .7 .8 0 0 1.1 0 -.8 .9",
-  TYPE (twist, pw_rotational_spring, twist),
+  TYPE (torsion, pw_rotational_spring, torsion),
   .bodies = 2,
-  FORCE (twist),
-  .energy = twist_energy,
-  .loss = twist_loss,
+  FORCE (torsion),
+  .energy = torsion_energy,
+  .loss = torsion_loss,
 };

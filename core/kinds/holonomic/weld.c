@@ -1,5 +1,5 @@
-/* weld: body 2 is fixed to body 1 at a point and at the relative angle beta = phi2 - phi1; in
- * other element types relative angles are phi1 - phi2.
+/* weld: body 2 is fixed to body 1 at a common point and at the relative angle beta = phi2 - phi1.  (In other element
+ * types relative angles are phi1 - phi2.)
  *
  *   g     = ( d,  phi1 - phi2 + beta ) = 0,  d = r1 + R(phi1) s1 - r2 - R(phi2) s2     (3 holonomic equations)
  *   gamma = ( as in points.h,  0 )
