@@ -286,7 +286,7 @@ static double side_natural (const pw_expression_code *c, double a, double b) {
 
 static double side_value (int op, double side, double a, double b) {
   if (op == PW_OP_ABS) return side * a;
-  if (op == PW_OP_MIN || op == PW_OP_MAX) return side ? b : a;
+  if (op == PW_OP_MIN || op == PW_OP_MAX) return side != 0 ? b : a;
   return op == PW_OP_MOD ? a - side * b : side;
 }
 
@@ -311,9 +311,9 @@ static double side_beyond (int op, double side, double a, double b) {
   case PW_OP_MAX:
   case PW_OP_LESS:
   case PW_OP_LESS_EQUAL:
-    return side ? a - b : b - a;
+    return side != 0 ? a - b : b - a;
   default: /* min, > and >= */
-    return side ? b - a : a - b;
+    return side != 0 ? b - a : a - b;
   }
 }
 

@@ -225,8 +225,10 @@ static void *difference_thread (void *argument) {
 }
 
 static int difference_add (difference *x, int parameter, int level, int neighbour) {
-  if (pw_grow (&x->task, (size_t)x->tasks, &x->task_room, sizeof *x->task) != PW_OK)
-    return x->status = pw_fail (x->error, PW_RESOURCE, "out of memory");
+  if (pw_grow (&x->task, (size_t)x->tasks, &x->task_room, sizeof *x->task) != PW_OK) {
+    x->status = PW_RESOURCE;
+    return pw_fail (x->error, PW_RESOURCE, "out of memory");
+  }
   x->task[x->tasks++] = (difference_task){ parameter, level, neighbour };
   return PW_OK;
 }

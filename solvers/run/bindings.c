@@ -139,6 +139,7 @@ const pw_member pw_members[] = {
   AT4 (pw_statistics, steps, rejected, rhs, jacobians),
   AT4 (pw_statistics, factorisations, restarts, specialised, position),
   AT4 (pw_statistics, unresolved, velocity, g, jv),
+  AT (pw_statistics, conditions),
   SIZE (pw_archive),
   AT4 (pw_archive, at, used, size, loading),
   SIZE (pw_ensemble),

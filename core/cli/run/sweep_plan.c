@@ -31,7 +31,7 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *er
     if (pw_cli_range ("--vary", text, &axis->range, error) != PW_OK) return error->status;
     const int one = axis->range.low == axis->range.high;
     axis->count = axis->range.count ? axis->range.count : one ? 1 : PW_AXIS_VALUES;
-    if (axis->count > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
+    if ((double)axis->count > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
     if (axis->count == 1 && !one)
       return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
     return PW_OK;

@@ -43,7 +43,7 @@ static int touch_make (const pw_contact *definition, double turn, touch *element
                       definition->radius,
                       definition->other_radius,
                       definition->other_radius > 0 };
-  if (element->is_disc && definition->heading != 0)
+  if (element->is_disc != 0 && definition->heading != 0)
     return pw_fail (error, PW_INPUT, "heading = %g: expected none: with other_radius, body 2 has a disc, not a line",
                     definition->heading);
   if (definition->mu_sliding > definition->mu)
@@ -59,18 +59,18 @@ PREPARE (touch_prepare, pw_contact, touch) {
 }
 
 PER_ELEMENT (touch_g, touch, 1) {
-  now.element->is_disc ? rod_g_one (now.rod, out) : line_g_one (now.line, out);
-  if (!now.element->is_disc) *out -= now.element->radius;
+  now.element->is_disc != 0 ? rod_g_one (now.rod, out) : line_g_one (now.line, out);
+  if (now.element->is_disc == 0) *out -= now.element->radius;
 }
 
 PER_ELEMENT (touch_g_size, touch, 1) {
-  now.element->is_disc ? rod_g_size_one (now.rod, out) : line_g_size_one (now.line, out);
-  if (!now.element->is_disc) *out += now.element->radius;
+  now.element->is_disc != 0 ? rod_g_size_one (now.rod, out) : line_g_size_one (now.line, out);
+  if (now.element->is_disc == 0) *out += now.element->radius;
 }
 
-#define TOUCH_GAP(function, size)                                                                       \
-  PER_ELEMENT (touch_##function, touch, size) {                                                         \
-    now.element->is_disc ? rod_##function##_one (now.rod, out) : line_##function##_one (now.line, out); \
+#define TOUCH_GAP(function, size)                                                                            \
+  PER_ELEMENT (touch_##function, touch, size) {                                                              \
+    now.element->is_disc != 0 ? rod_##function##_one (now.rod, out) : line_##function##_one (now.line, out); \
   }
 TOUCH_GAP (J, 6)
 TOUCH_GAP (gamma, 1)
@@ -104,14 +104,14 @@ static inline void rub_tangent (const rod_state *of, double e[2]) {
 PER_ELEMENT (rub_J, rub, 6) {
   double e[2];
   rub_tangent (&now.rod, e);
-  now.element->is_disc ? rod_multiply_D (&now.rod, e, out) : line_J_one (now.line, out);
+  now.element->is_disc != 0 ? rod_multiply_D (&now.rod, e, out) : line_J_one (now.line, out);
   out[2] += now.element->radius;
-  out[5] += now.element->is_disc ? now.element->other : -now.element->radius;
+  out[5] += now.element->is_disc != 0 ? now.element->other : -now.element->radius;
 }
 
 PER_ELEMENT (rub_gamma, rub, 1) {
   double e[2], c[2];
-  if (!now.element->is_disc) {
+  if (now.element->is_disc == 0) {
     line_gamma_one (now.line, out);
     return;
   }
@@ -124,7 +124,7 @@ PER_ELEMENT (rub_gamma, rub, 1) {
 PER_ELEMENT (rub_jw_q, rub, 6) {
   const points_state *ends = &now.rod.ends;
   double e[2], Dw[2] = { 0, 0 };
-  if (!now.element->is_disc) {
+  if (now.element->is_disc == 0) {
     line_jw_q_one (now.line, out);
     return;
   }
@@ -139,7 +139,7 @@ PER_ELEMENT (rub_jw_q, rub, 6) {
 PER_ELEMENT (rub_gamma_q, rub, 6) {
   const rod_state *of = &now.rod;
   double e[2], c[2];
-  if (!now.element->is_disc) {
+  if (now.element->is_disc == 0) {
     line_gamma_q_one (now.line, out);
     return;
   }
@@ -152,7 +152,7 @@ PER_ELEMENT (rub_gamma_q, rub, 6) {
 
 PER_ELEMENT (rub_gamma_v, rub, 6) {
   double e[2];
-  if (!now.element->is_disc) {
+  if (now.element->is_disc == 0) {
     line_gamma_v_one (now.line, out);
     return;
   }

@@ -211,8 +211,8 @@ def command(name: str, model, *arguments, **options):
     *arguments, **options
         Further arguments and options of the command, see :func:`help_of`: ``t_end=10`` stands for ``--t-end=10``,
         ``energy=True`` for ``--energy``; a list repeats the option, and so does a dict: ``hold={"frame.vx": 1}`` stands
-        for ``--hold=frame.vx=1``, and ``free={"m": (0, 2)}`` for ``--free=m=0:2``.  ``data`` may be a dict of arrays or a
-        DataFrame.
+        for ``--hold=frame.vx=1``, ``free={"m": (0, 2)}`` for ``--free=m=0:2``, and in a sweep ``vary={"m": [0, 2]}`` for
+        ``--vary=m=0,2``.  ``data`` may be a dict of arrays or a DataFrame.
 
     Returns
     -------
@@ -491,7 +491,7 @@ def _report(name, model, arguments, options, tables):
     with tempfile.TemporaryDirectory() as made:
         folder = pathlib.Path(made)
         words = [name, *_program.options(model), *map(str, arguments)]
-        words += [word for key, value in options.items() for word in _words(key, value, folder)]
+        words += [word for key, value in options.items() for word in _words(name, key, value, folder)]
         wanted = _output(name, described, folder, tables)
         if wanted and not any(word.split("=")[0] in ("-o", wanted.split("=")[0]) for word in words):
             words.append(wanted)
@@ -514,23 +514,24 @@ def _output(name, described, folder, tables):
 _LISTS = (list, tuple, np.ndarray)
 
 
-def _words(key, value, folder):
-    """An option as arguments."""
+def _words(name, key, value, folder):
+    """An option of a command as arguments."""
     option = "--" + key.replace("_", "-")
     if key == "data" and not isinstance(value, (str, os.PathLike)):
         value = _write_columns(folder / "data.csv", value)
     if value is None or value is False:
         return []
     if hasattr(value, "items"):
-        return [f"{option}={name}" + ("" if x is None else f"={_value(x)}") for name, x in value.items()]
+        return [f"{option}={item}" + ("" if x is None else f"={_value(name, x)}") for item, x in value.items()]
     if key in ("columns", "methods") or key.endswith("_ladder"):
         value = value if isinstance(value, str) else (":" if key.endswith("_ladder") else ",").join(map(str, value))
     return [option if item is True else f"{option}={item}" for item in (value if isinstance(value, _LISTS) else [value])]
 
 
-def _value(x):
-    """A value of an option: a range as LOW:HIGH."""
-    return ":".join(map(str, x)) if isinstance(x, _LISTS) else str(x)
+def _value(name, x):
+    """A value of an option: a range as LOW:HIGH, the values of a list of a sweep one by one."""
+    separator = "," if name == "sweep" and not isinstance(x, tuple) else ":"
+    return separator.join(map(str, x)) if isinstance(x, _LISTS) else str(x)
 
 
 def _write_columns(path, columns):
