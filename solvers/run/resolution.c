@@ -168,9 +168,10 @@ static double resolution_effect (pw_run *r, const pw_source *source) {
   double *f = r->scratch, *changed = f + s->coords + 3, most = 0;
   if (!source->of_force) return 0;
   pw_evaluate_force (r->w, f);
+  const double u = source->u[0];
   source->u[0] += 1;
   pw_evaluate_force (r->w, changed);
-  source->u[0] -= 1;
+  source->u[0] = u; /* not u + 1 - 1: it may be small */
   for (int j = 0; j < s->coords; j++) {
     const double change = fabs (changed[j] - f[j]);
     if (change > 0) most = fmax (most, change / (s->mass[j] * pw_velocity_unit (r, j, r->v[j])));
