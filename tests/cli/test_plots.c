@@ -258,8 +258,7 @@ TEST (gnuplot_interrupted) {
     "optimise pendulum --minimise bob.y --free I=0:1 -t 0.1 --starts 1 --json @/stop/o.json --plots @/stop",
     "fit pendulum --data @/stop/data.csv --columns bob.phi --free g --plots @/stop --json @/stop/o.json",
     "run pendulum -t 0.1 --plots @/stop --json @/stop/o.json",
-    "sensitivity pendulum --of bob.x --by g -t 0.1 -o @/stop/sensitivity.csv --json @/stop/sensitivity.json --plots "
-    "@/stop"
+    "sensitivity pendulum --of bob.x --by g -t 0.1 -o @/stop/s.csv --json @/stop/sensitivity.json --plots @/stop",
   };
   cli_good ("mkdir -p @/stop/bin && printf '#!/bin/sh\\nkill -INT $PPID; exit 1\\n' >@/stop/bin/gnuplot && chmod +x "
             "@/stop/bin/gnuplot && pinwheel run pendulum -t 1 --every 0.1 -o @/stop/data.csv");
