@@ -10,12 +10,6 @@
 
 const check_fixture fixture = { .setup = cli_setup, .teardown = cli_teardown };
 
-static const char *const conditions_methods[] = { "erk5+projection", "erk8+projection", "radau+ggl",
-                                                  "bdf+projection",  "ida+ggl",         "adams+none" };
-enum { CONDITIONS_METHODS = sizeof conditions_methods / sizeof *conditions_methods };
-
-#define CONDITIONS_STEPS 1e3 /* the errors of some hundred steps, each within the tolerance, in one direction */
-
 /* A body of 1 kg with a force along x. */
 static pw_system *conditions_scene (double x, double v, const char *force) {
   cli_write ("conditions.yaml",
@@ -55,14 +49,14 @@ TEST (closed_forms) {
   for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
     const pw_settings settings = { .span = of[i].T, .rtol = 1e-9 };
     pw_system *s = conditions_scene (of[i].x, of[i].v, of[i].force);
-    for (int m = 0; m < CONDITIONS_METHODS; m++) {
+    for (int m = 0; m < RUNS_ADAPTIVE; m++) {
       double q[3], v[3];
       pw_statistics statistics;
-      runs_state (s, conditions_methods[m], &settings, of[i].T, q, v, &statistics);
-      const double bound = CONDITIONS_STEPS * settings.rtol * (1 + fabs (of[i].x));
-      check_close (conditions_methods[m], q[0], of[i].x_end, bound, "steps");
-      check_close (conditions_methods[m], v[0], of[i].v_end, bound, "steps");
-      check_close (conditions_methods[m], (double)statistics.conditions, of[i].changes, 0, "all, and no others");
+      runs_state (s, runs_adaptive[m], &settings, of[i].T, q, v, &statistics);
+      const double bound = RUNS_STEPS * settings.rtol * (1 + fabs (of[i].x));
+      check_close (runs_adaptive[m], q[0], of[i].x_end, bound, "steps");
+      check_close (runs_adaptive[m], v[0], of[i].v_end, bound, "steps");
+      check_close (runs_adaptive[m], (double)statistics.conditions, of[i].changes, 0, "all, and no others");
     }
     pw_system_free (s);
   }
@@ -149,10 +143,10 @@ TEST (random) {
 TEST (sliding) {
   static const char *const force[] = { "-0.5*sign (b.vx)", "0.2 - 0.5*sign (b.vx)", "-(b.x + b.vx > 0 ? 1 : -1)" };
   for (int i = 0; i < 3; i++)
-    for (int m = 0; m < CONDITIONS_METHODS; m++) {
+    for (int m = 0; m < RUNS_ADAPTIVE; m++) {
       pw_error error = { 0 };
       pw_system *s = conditions_scene (i == 2 ? 0.5 : 0, i == 1 ? 0 : 0.5, force[i]);
-      pw_run *r = pw_run_open (s, conditions_methods[m], &(pw_settings){ .span = 10, .rtol = 1e-8 }, &error);
+      pw_run *r = pw_run_open (s, runs_adaptive[m], &(pw_settings){ .span = 10, .rtol = 1e-8 }, &error);
       int status = r ? PW_OK : PW_INPUT;
       while (status == PW_OK && pw_run_time (r) < 10) status = pw_run_advance (r, 10, &error);
       assert_int_equal (status, PW_METHOD);
@@ -183,21 +177,16 @@ TEST (sides) {
 TEST (checkpoint) {
   pw_system *s = conditions_scene (12, 6, "-b.x - sign (b.vx) + 100*max (0, -b.x - 3)");
   const pw_settings settings = { .span = 7, .step = 1e-3 };
-  for (int m = -1; m < CONDITIONS_METHODS; m++)
+  for (int m = -1; m < RUNS_ADAPTIVE; m++)
     for (int k = 1; k < 40; k += 3) {
-      const char *method = m < 0 ? "rk4+none" : conditions_methods[m];
+      const char *method = m < 0 ? "rk4+none" : runs_adaptive[m];
       pw_error error = { 0 };
-      pw_archive archive = { .at = NULL };
       pw_run *r = runs_open (s, method, &settings);
       for (int i = 0; i < (m < 0 ? 83 * k : k); i++) check_ok (pw_run_advance (r, 7, &error), &error);
-      check_ok (pw_run_save (r, &archive, &error), &error);
-      const double expected = runs_to (r, 7).q[0];
+      pw_run *loaded = runs_copy (r, s, method, &settings);
+      check_close (method, runs_to (loaded, 7).q[0], runs_to (r, 7).q[0], 0, "to the bit");
+      pw_run_close (loaded);
       pw_run_close (r);
-      r = runs_open (s, method, &settings);
-      check_ok (pw_run_load (r, &(pw_archive){ .at = archive.at, .size = archive.used, .loading = 1 }, &error), &error);
-      check_close (method, runs_to (r, 7).q[0], expected, 0, "to the bit");
-      pw_run_close (r);
-      pw_archive_free (&archive);
     }
   pw_system_free (s);
 }

@@ -8,12 +8,7 @@
 
 const check_fixture fixture = { .setup = cli_setup, .teardown = cli_teardown };
 
-static const char *const narrow_methods[] = { "erk5+projection", "erk8+projection", "radau+ggl",
-                                              "bdf+projection",  "ida+ggl",         "adams+none" };
-enum { NARROW_METHODS = sizeof narrow_methods / sizeof *narrow_methods };
-
 #define NARROW_BODY "pinwheel: 1\nbodies:\n  - {name: b, mass: 1, inertia: 1%s}\nelements:\n  - %s\n"
-#define NARROW_STEPS 1e3 /* the errors of some hundred steps, each within the tolerance, in one direction */
 
 static pw_system *narrow_scene (const char *rest, const char *element) {
   cli_write ("narrow.yaml", check_text (NARROW_BODY, rest, element));
@@ -39,10 +34,10 @@ TEST (gusts) {
       pw_system *s =
           narrow_scene ("", check_text ("{force: F, body: b, fx: '50*exp (-%g*(t - %.17g)^2)'}", width[w], at[k]));
       const double v = 50 * sqrt (PW_PI / width[w]);
-      for (int m = 0; m < NARROW_METHODS; m++) {
-        double found, x = narrow_run (s, narrow_methods[m], &settings, 2.9, &found, NULL);
-        check_close (narrow_methods[m], x, v * (2.9 - at[k]), NARROW_STEPS * settings.rtol * 2.9, "steps");
-        check_close (narrow_methods[m], found, v, NARROW_STEPS * settings.rtol, "steps");
+      for (int m = 0; m < RUNS_ADAPTIVE; m++) {
+        double found, x = narrow_run (s, runs_adaptive[m], &settings, 2.9, &found, NULL);
+        check_close (runs_adaptive[m], x, v * (2.9 - at[k]), RUNS_STEPS * settings.rtol * 2.9, "steps");
+        check_close (runs_adaptive[m], found, v, RUNS_STEPS * settings.rtol, "steps");
       }
       pw_system_free (s);
     }
@@ -55,9 +50,9 @@ TEST (harmonic) {
   pw_settings settings = { .span = T, .rtol = 1e-7 };
   pw_statistics statistics;
   double v;
-  for (int m = 0; m < NARROW_METHODS; m++)
-    check_close (narrow_methods[m], narrow_run (s, narrow_methods[m], &settings, T, &v, NULL),
-                 (1 - cos (w * T)) / w / w, NARROW_STEPS * settings.rtol * T, "steps");
+  for (int m = 0; m < RUNS_ADAPTIVE; m++)
+    check_close (runs_adaptive[m], narrow_run (s, runs_adaptive[m], &settings, T, &v, NULL), (1 - cos (w * T)) / w / w,
+                 RUNS_STEPS * settings.rtol * T, "steps");
   const double step[] = { 1e-3, 2.5e-4 };
   for (int k = 0; k < 2; k++) {
     narrow_run (s, "rk4+none", &(pw_settings){ .span = T, .step = step[k] }, T, &v, &statistics);
@@ -83,10 +78,10 @@ TEST (other_forms) {
     pw_statistics statistics;
     double v, v0, x0 = narrow_run (s, "rk4+projection", &fixed, 1.6, &v0, &statistics);
     assert_int_equal (statistics.unresolved, 0);
-    for (int m = 0; m < NARROW_METHODS; m++) {
-      const double x = narrow_run (s, narrow_methods[m], &settings, 1.6, &v, NULL);
-      check_close (check_text ("%s, %d", narrow_methods[m], i), x, x0, 10 * NARROW_STEPS * settings.rtol, "steps");
-      check_close (check_text ("%s, %d", narrow_methods[m], i), v, v0, 10 * NARROW_STEPS * settings.rtol, "steps");
+    for (int m = 0; m < RUNS_ADAPTIVE; m++) {
+      const double x = narrow_run (s, runs_adaptive[m], &settings, 1.6, &v, NULL);
+      check_close (check_text ("%s, %d", runs_adaptive[m], i), x, x0, 10 * RUNS_STEPS * settings.rtol, "steps");
+      check_close (check_text ("%s, %d", runs_adaptive[m], i), v, v0, 10 * RUNS_STEPS * settings.rtol, "steps");
     }
     pw_system_free (s);
   }
@@ -102,10 +97,10 @@ TEST (bumps) {
     pw_system *s = narrow_scene (", rate: {vx: 1}",
                                  check_text ("{force: F, body: b, fx: '-%.17g*exp (-%g*(b.x - 1)^2)'}", a, width));
     const double after = work[k % 3] > 0.5 ? -1 : sqrt (1 - 2 * work[k % 3]);
-    for (int m = 0; m < NARROW_METHODS; m++) {
+    for (int m = 0; m < RUNS_ADAPTIVE; m++) {
       double v;
-      narrow_run (s, narrow_methods[m], &settings, 3, &v, NULL);
-      check_close (check_text ("%s, %g, %g", narrow_methods[m], width, a), v, after, NARROW_STEPS * settings.rtol,
+      narrow_run (s, runs_adaptive[m], &settings, 3, &v, NULL);
+      check_close (check_text ("%s, %g, %g", runs_adaptive[m], width, a), v, after, RUNS_STEPS * settings.rtol,
                    "steps");
     }
     pw_statistics statistics;

@@ -283,18 +283,16 @@ TEST (ledger) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "adams",
                                         "bdf+projection", "ida+ggl",         "galpha" };
   for (int i = 0; i < 6; i++) {
-    pw_error error = { 0 };
-    pw_archive a = { .at = NULL };
+    const pw_settings settings = { .step = 1e-3, .rtol = 1e-8, .span = 2, .ledger = 1 };
     pw_system *s = saved_system (0);
-    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2, .ledger = 1 });
+    pw_run *r = runs_open (s, method[i], &settings);
     runs_to (r, 1);
-    check_ok (pw_run_save (r, &a, &error), &error);
-    pw_sample x = runs_to (r, 2);
+    pw_run *loaded = runs_copy (r, s, method[i], &settings);
+    pw_sample x = runs_to (loaded, 2);
     check_below (method[i], fabs (x.balance), 1e-4 * x.work, "errors of galpha at h = 1e-3, the others less");
     check_below (method[i], 1e-3, x.work, "there is work to be accounted for");
-    pw_archive_free (&a);
-    pw_run_close (r);
-    pw_system_free (s);
+    pw_run_close (loaded);
+    runs_close (r, s);
   }
 }
 
@@ -304,21 +302,13 @@ TEST (negative) {
   pw_system *s = saved_system (0);
   int n = pw_system_coordinates (s);
   for (int i = 0; runs_method (i, name); i++) {
-    pw_error error = { 0 };
-    pw_archive archive = { .at = NULL };
-    double q[6];
     const pw_settings settings = { .t = -2, .step = 0.01, .rtol = 1e-6, .span = 3 };
     pw_run *r = runs_open (s, name, &settings);
     runs_to (r, -1);
-    check_ok (pw_run_save (r, &archive, &error), &error);
-    memcpy (q, runs_to (r, 1).q, sizeof q);
+    pw_run *loaded = runs_copy (r, s, name, &settings);
+    check_bits (name, runs_to (loaded, 1).q, runs_to (r, 1).q, n);
+    pw_run_close (loaded);
     pw_run_close (r);
-    r = runs_open (s, name, &settings);
-    pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
-    check_ok (pw_run_load (r, &from, &error), &error);
-    check_bits (name, runs_to (r, 1).q, q, n);
-    pw_run_close (r);
-    pw_archive_free (&archive);
   }
   pw_system_free (s);
 }

@@ -18,6 +18,16 @@ void runs_close (pw_run *r, pw_system *s) {
   pw_system_free (s);
 }
 
+pw_run *runs_copy (pw_run *r, pw_system *s, const char *method, const pw_settings *settings) {
+  pw_error error = { 0 };
+  pw_archive archive = { .at = NULL };
+  pw_run *copy = runs_open (s, method, settings);
+  check_ok (pw_run_save (r, &archive, &error), &error);
+  check_ok (pw_run_load (copy, &(pw_archive){ .at = archive.at, .size = archive.used, .loading = 1 }, &error), &error);
+  pw_archive_free (&archive);
+  return copy;
+}
+
 pw_system *runs_scene (const char *scene, const char *sets) {
   pw_error error = { 0 };
   char path[100], name[20];
@@ -46,6 +56,9 @@ const pw_method *runs_method (int i, char name[40]) {
       }
   return NULL;
 }
+
+const char *const runs_adaptive[RUNS_ADAPTIVE] = { "erk5+projection", "erk8+projection", "radau+ggl",
+                                                   "bdf+projection",  "ida+ggl",         "adams+none" };
 
 pw_sample runs_to (pw_run *r, double t) {
   pw_error error = { 0 };
