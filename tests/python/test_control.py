@@ -372,7 +372,7 @@ def test_vehicles_are_reset_one_by_one():
 
 
 def test_a_vehicle_that_fails_waits():
-    """Of pendulums on a rotating arm, one begins where its position is singular."""
+    """The force of one of three bodies has no value beyond x = 1."""
     model = pw.describe(bodies=[pw.Body("a", mass=1, inertia=1)], elements=[
         pw.Force("f", body="a", fx="sqrt(1 - a.x)"), pw.Torque("m", body=["a", "ground"], value=0)])
     with pw.VectorSimulation(model, 3, "rk4", inputs={"m": 0.0}) as vehicles:

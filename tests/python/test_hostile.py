@@ -176,7 +176,7 @@ def smooth(t):
 
 
 def test_there_are_all_methods():
-    assert len(METHODS) == 28 and "bdf+projection" in METHODS
+    assert len(METHODS) == 29 and "bdf+projection" in METHODS
 
 
 @pytest.mark.parametrize("method", METHODS)
