@@ -203,14 +203,14 @@ def _declare(library, result, *names_and_arguments):
 # Types of arguments and results: pointer, int, double, text, error, size.
 _p, _i, _d, _s, _e, _z = c.c_void_p, c.c_int, c.c_double, c.c_char_p, c.POINTER(pw_error), c.c_size_t
 _declare(files, _p, ("pw_file_open", _s, _e), ("pw_file_model", _p, _e))
-_declare(files, _s, ("pw_file_name", _p), ("pw_file_path", _p))
+_declare(files, _s, ("pw_file_name", _p))
 _declare(files, c.POINTER(pw_plugin_table), ("pw_file_table", _p))
 _declare(files, None, ("pw_file_close", _p))
 _declare(files, _i, ("pw_read_expression", _s, _double_p), ("pw_file_list", c.CFUNCTYPE(_i, _p, _s, _s), _p, _e))
 _declare(core, None, ("pw_model_free", _p), ("pw_system_free", _p), ("pw_run_close", _p), ("pw_linear_free", c.POINTER(pw_linear)))
 _declare(core, _i, ("pw_model_set", _p, _s, _d, _e), ("pw_model_build", _p, _e), ("pw_model_set_initial", _p, _s, _d, _e),
          ("pw_model_set_signal", _p, _s, _s, c.POINTER(pw_signal), _e))
-_declare(core, _d, ("pw_model_parameter", _p, _p), ("pw_method_steps", _s, c.POINTER(pw_settings), _d, _d))
+_declare(core, _d, ("pw_method_steps", _s, c.POINTER(pw_settings), _d, _d))
 _declare(core, _p, ("pw_system_source", _p, _p, _e), ("pw_run_source", _p, _e))
 _declare(files, _p, ("pw_scene_code_open", _p, _p, _e), ("pw_scene_code_table", _p))
 _declare(files, None, ("pw_scene_code_close", _p))
@@ -221,8 +221,8 @@ _declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_signal_
          ("pw_system_record_name", _p, _i, _s, _z), ("pw_system_record_unit", _p, _i),
          ("pw_system_table_notice", _p, _i, _d, _s, _z),
          ("pw_system_state_unit", _p, _i), ("pw_system_signal_unit", _p, _i))
-_declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p, _p, _p, _e),
-         ("pw_run_record_width", _p), ("pw_system_record_width", _p, _i), ("pw_system_record_same", _p, _p, _i), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
+_declare(core, _i, ("pw_run_record_width", _p), ("pw_system_record_width", _p, _i), ("pw_system_record_same", _p, _p, _i),
+         ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
 _declare(core, _p, ("pw_repetition_open", _p, _s, c.POINTER(pw_settings), _p, c.c_long, _e))
 _declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_error", _p, _p, c.c_long, _p, _p, _e))
@@ -245,8 +245,8 @@ _declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_a
          ("pw_system_contacts", _p), ("pw_system_outputs", _p))
 _declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
-_declare(core, _i, ("pw_run_redundant", _p), ("pw_specialised_fits", _p, _p), ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),
-         ("pw_initial_specified", c.POINTER(pw_initial_report), _i))
+_declare(core, _i, ("pw_specialised_fits", _p, _p), ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i),
+         ("pw_initial_given", c.POINTER(pw_initial_report), _i), ("pw_initial_specified", c.POINTER(pw_initial_report), _i))
 _declare(core, c.POINTER(pw_statistics), ("pw_run_statistics", _p))
 
 

@@ -72,9 +72,7 @@ class Ensemble:
     def open(self, i, start=None, t=0.0):
         """Opens run i anew, with these values of states, by number, and initial time; a refused one leaves the former."""
         start, settings = start or {}, self._settings
-        values = (lib.pw_initial_value * len(start))()
-        for value, (value.state, value.value) in zip(values, start.items()):
-            pass
+        values = (lib.pw_initial_value * len(start))(*[lib.pw_initial_value(state=i, value=x) for i, x in start.items()])
         settings.t, settings.initial, settings.initials = t, c.addressof(values), len(start)
         system = self._systems[i]
         code = settings.specialised

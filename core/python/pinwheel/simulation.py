@@ -213,16 +213,19 @@ class Simulation:
     def __reduce_ex__(self, _):
         raise TypeError("an open run cannot be copied or sent to other processes")
 
+    def _acquire(self) -> None:
+        """Takes the lock of the run, which one user at a time may hold."""
+        if not self._lock.acquire(blocking=False):
+            raise lib.Error(_IN_USE)
+        if self._run is None:
+            self._lock.release()
+            raise lib.Error("the run is closed")
+
     @contextlib.contextmanager
     def _used(self) -> Iterator[int]:
         """The run, for one user at a time."""
-        if self._run is None:
-            raise lib.Error("the run is closed")
-        if not self._lock.acquire(blocking=False):
-            raise lib.Error(_IN_USE)
+        self._acquire()
         try:
-            if self._run is None:
-                raise lib.Error("the run is closed")
             yield self._run.pointer
         finally:
             self._lock.release()
@@ -255,9 +258,6 @@ class Simulation:
                   "unresolved", "g", "jv")
         return {**{name: getattr(s, name) for name in counts}, "residual.position": s.position, "residual.velocity": s.velocity}
 
-    def _columns(self):
-        return self._ensemble.columns
-
     # ---- Control ----
 
     def step(self, inputs=None, dt: float | None = None) -> None:
@@ -283,11 +283,8 @@ class Simulation:
             else:
                 self._values[:] = array(np.atleast_1d(inputs), self._values.shape, "inputs")
         dt = duration(dt, self._settings.step)
-        if not self._lock.acquire(blocking=False):
-            raise lib.Error(_IN_USE)
+        self._acquire()
         try:
-            if self._run is None:
-                raise lib.Error("the run is closed")
             self._ensemble.step(dt)
             self._ensemble.check(0)
         finally:
@@ -313,11 +310,8 @@ class Simulation:
         InputError, MethodError
         """
         store, values, _ = self._ensemble.plan(self.states if names is None else names)
-        if not self._lock.acquire(blocking=False):
-            raise lib.Error(_IN_USE)
+        self._acquire()
         try:
-            if self._run is None:
-                raise lib.Error("the run is closed")
             store()
             self._ensemble.check(0)
         finally:
@@ -480,7 +474,7 @@ class Simulation:
     def sample(self) -> dict:
         """The state reached, with reactions and energies: numbers by name."""
         with self._used() as run:
-            units, _ = self._columns()
+            units, _ = self._ensemble.columns
             t = lib.core.pw_run_time(run)
             return dict(zip(units, self._record(run, np.array([t]), t).used[0].tolist()))
 
@@ -529,7 +523,7 @@ class Simulation:
             t_end = self._later(run, t_end, "t_end")
             times = self._times(lib.core.pw_run_time(run), t_end, every, times)
             rows = _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
-            condition = None if until is None else self._condition(until)
+            condition = None if until is None else _Condition(self._system, until, self._settings.ledger)
             try:
                 call = lib.Call()
                 call.passing(self._record, run, times, t_end, rows, progress, call, condition)
@@ -550,12 +544,9 @@ class Simulation:
             result.stopped = condition.time if condition else None
             return result
 
-    def _condition(self, text):
-        return _Condition(self._system, text, self._settings.ledger)
-
     def _result(self, run, rows, t_end, status, reason):
         """The rows as a Result."""
-        units, groups = self._columns()
+        units, groups = self._ensemble.columns
         result = Result(rows.used, groups, units, status, reason, self._statistics(run), self.model,
                         {"method": self.method, "t_end": t_end, **self._given})
         result.changed = self.changed
@@ -630,15 +621,14 @@ class Simulation:
         if times is None:
             self._call(run, np.array([start]), start, rows, 1.0)
         if condition:
-            self._steps_per_call = 1
             condition.check(run)
         with watched(progress) as report:
             while not (condition and condition.time is not None) and (
                     rows.count < len(times) if times is not None else now(run) < t_end):
                 done = (now(run) - start) / (t_end - start) if t_end > start else 1.0
-                self._call(run, None if times is None else times[rows.count:], t_end, rows, done)
                 if condition:
                     self._steps_per_call = 1
+                self._call(run, None if times is None else times[rows.count:], t_end, rows, done)
                 if condition and condition.check(run) is not None:
                     rows.count = int(np.searchsorted(rows.used[:, 0], condition.time))
                     self._call(run, np.array([condition.time]), now(run), rows, 1.0)

@@ -16,8 +16,8 @@ from .simulation import adaptive
 class VectorSimulation:
     """Many vehicles of one model, stepped together in threads and in lanes of vector registers, for learning and control.
 
-    Each vehicle moves as if it were alone.  One that fails stays where it is, its observations are NaN, and ``failed``
-    and ``reasons`` tell it, until it is reset.
+    Each vehicle moves as if it were alone.  One that fails waits until it is reset: its observations are NaN, ``failed``
+    marks it, and ``reasons`` says why.
 
     Parameters
     ----------
