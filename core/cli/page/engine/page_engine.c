@@ -264,7 +264,7 @@ PAGE_EXPORT (release) void page_release (void *p) {
   free (p);
 }
 
-/* The functions of libraries that explicit methods call, for scenes small enough to run in a web page: AMD's
+/* The functions of libraries that the methods of pages call, for scenes small enough to run in a web page: AMD's
  * order, BTF's matching, LAPACK's solution by a Cholesky factorisation, KLU's factorisation. */
 
 /* Nodes with few neighbours first; where that does not reduce fill-in, block_ldl.c keeps the natural order. */
