@@ -331,6 +331,20 @@ void pw_evaluate_by_signal (const pw_element_batch *k, int e, int u, pw_by_signa
 /* The time derivative of state j that a feedback signal reads, numbered as in pw_system_find_state: a velocity, or the
  * rate of a first-order state. */
 double pw_read_rate (const pw_workspace *w, int j, const double *v);
+/* The batch of an equation; *e: its element there; *J: its row of J in the columns of that element. */
+static inline const pw_element_batch *pw_find_row (const pw_workspace *w, int row, int *e, const double **J) {
+  const pw_element_batch *k = w->batch;
+  while (row >= k->row + k->b.count * k->kind->rows) k++;
+  *e = (row - k->row) / k->kind->rows;
+  *J = k->J + (row - k->row) * k->b.cols;
+  return k;
+}
+
+/* 1 if the signal has conditions on states (pw_function.sides). */
+static inline int pw_source_has_conditions (const pw_source *x) {
+  return x->signal.type == PW_FUNCTION && x->signal.function.sides && x->reads > 0;
+}
+
 /* The signal that is the rate of the first-order state that is the velocity of coordinate j. */
 static inline const pw_source *pw_rate_source (const pw_workspace *w, int j) {
   return w->source + w->s->sources - w->s->coords + j; /* the last signals are those of the states */

@@ -134,10 +134,9 @@ static void tangent_put_J (pw_tangent *x, tangent_part part, const pw_placement 
 static void tangent_put_couplings (pw_tangent *x, const pw_placement *put) {
   const pw_run *r = x->run;
   for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++) {
-    const pw_element_batch *k = r->w->batch;
-    while (c->row >= k->row + k->b.count * k->kind->rows) k++;
-    const int e = (c->row - k->row) / k->kind->rows;
-    const double *J = k->J + (c->row - k->row) * k->b.cols;
+    int e;
+    const double *J;
+    const pw_element_batch *k = pw_find_row (r->w, c->row, &e, &J);
     for (int i = 0; i < k->b.cols; i++)
       if (pw_global (k, e, i) < r->s->coords)
         pw_scatter_add (&x->scatter, put->row + pw_global (k, e, i), put->col + x->row_index[c->on],

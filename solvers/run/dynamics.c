@@ -410,7 +410,7 @@ double pw_run_option (const pw_run *r, const char *name) {
 static void sides_fix (pw_run *r, double t, const double *q, const double *v) {
   if (r->sides == NULL) return;
   for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
-    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL) continue;
+    if (!pw_source_has_conditions (x)) continue;
     for (int i = 0; q && i < x->reads; i++) {
       const int j = x->state[i];
       x->x[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];

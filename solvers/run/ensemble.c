@@ -107,9 +107,8 @@ static void ensemble_divide (const pw_ensemble *e, double dt) {
   pthread_t thread[THREADS];
   ensemble_part part[THREADS];
   const int lanes = e->lanes ? pw_specialised_lanes_count (e->lanes) : 1, groups = (e->count + lanes - 1) / lanes;
-  const int wanted = e->threads < groups ? e->threads : groups, parts = wanted < 1         ? 1
-                                                                        : wanted < THREADS ? wanted
-                                                                                           : THREADS;
+  const int wanted = e->threads < groups ? e->threads : groups;
+  const int parts = wanted < 1 ? 1 : wanted < THREADS ? wanted : THREADS;
   int started = 0;
   for (int k = 0, first = 0; k < parts; k++, first = part[k - 1].last) {
     const int last = (int)((long)groups * (k + 1) / parts) * lanes;

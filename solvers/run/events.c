@@ -189,10 +189,10 @@ static void events_u (pw_run *r, const double *v, int g, double *u) {
 
 /* J v of an equation, where J is evaluated. */
 static double circle_speed (const pw_workspace *w, int row) {
-  const pw_element_batch *k = w->batch;
-  while (row >= k->row + k->b.count * k->kind->rows) k++;
-  const int e = (row - k->row) / k->kind->rows, bodies = k->kind->bodies;
-  const double *J = k->J + (row - k->row) * k->b.cols;
+  int e;
+  const double *J;
+  const pw_element_batch *k = pw_find_row (w, row, &e, &J);
+  const int bodies = k->kind->bodies;
   double sum = 0;
   for (int n = 0; n < bodies; n++, J += 3) {
     const pw_configuration *p = k->b.configuration + k->b.body[e * bodies + n];

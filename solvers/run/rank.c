@@ -29,20 +29,11 @@ void pw_list_elements (const pw_system *s, const unsigned char *which, int wante
   if (more > 0) snprintf (list + length, size - length, "%s%d more", length ? " and " : "", more);
 }
 
-/* The batch of an equation; *e: its element there; *J: its row of J in the columns of that element. */
-static const pw_element_batch *rank_find (const pw_workspace *w, int row, int *e, const double **J) {
-  const pw_element_batch *k = w->batch;
-  while (row >= k->row + k->b.count * k->kind->rows) k++;
-  *e = (row - k->row) / k->kind->rows;
-  *J = k->J + (row - k->row) * k->b.cols;
-  return k;
-}
-
 double pw_rank_norm (const pw_workspace *w, int row) {
   int e;
   const double *J;
   double square = 0;
-  const pw_element_batch *k = rank_find (w, row, &e, &J);
+  const pw_element_batch *k = pw_find_row (w, row, &e, &J);
   for (int c = 0; c < k->b.cols; c++) {
     int j = pw_global (k, e, c);
     double x = j < w->s->coords ? J[c] / pw_length_factor (w->s, j) : 0;
@@ -57,7 +48,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const double *J;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
   for (int i = 0; i < s->rows; i++, rows += n) {
-    const pw_element_batch *k = rank_find (w, i, &e, &J);
+    const pw_element_batch *k = pw_find_row (w, i, &e, &J);
     const double length = pw_rank_norm (w, i);
     for (int c = 0; c < k->b.cols && length > 0; c++) {
       int j = pw_global (k, e, c);
@@ -109,7 +100,7 @@ static void rank_read (rank_basis *b, const pw_workspace *w) {
   int entry = 0;
   for (int i = 0, e; i < w->s->rows; i++) {
     const double *J, length = pw_rank_norm (w, i);
-    const pw_element_batch *k = rank_find (w, i, &e, &J);
+    const pw_element_batch *k = pw_find_row (w, i, &e, &J);
     b->first[i] = entry;
     for (int c = 0; c < k->b.cols; c++, entry++) {
       int j = pw_global (k, e, c), is_empty = j >= w->s->coords || length == 0;
@@ -242,7 +233,7 @@ static int rank_select (rank_basis *b, const pw_workspace *w, double tol, int ma
 double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
   int e;
   const double *J;
-  const pw_element_batch *k = rank_find (w, row, &e, &J);
+  const pw_element_batch *k = pw_find_row (w, row, &e, &J);
   for (int b = 0; b < k->kind->bodies; b++)
     if (J[3 * b] != 0 || J[3 * b + 1] != 0) return 1;
   return w->scale.length;
@@ -252,7 +243,7 @@ double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
 static void redundancy_add_row (const pw_workspace *w, int row, double weight, double *f) {
   int e;
   const double *J;
-  const pw_element_batch *k = rank_find (w, row, &e, &J);
+  const pw_element_batch *k = pw_find_row (w, row, &e, &J);
   for (int c = 0; c < k->b.cols; c++) f[pw_global (k, e, c)] += weight * J[c];
 }
 

@@ -24,7 +24,7 @@
 static void sides_evaluate (pw_run *r, double t, const double *q, const double *v, double *beyond) {
   for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
     double *state = r->sides->read;
-    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL) continue;
+    if (!pw_source_has_conditions (x)) continue;
     for (int i = 0; i < x->reads; i++) {
       const int j = x->state[i];
       state[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];
@@ -69,7 +69,7 @@ static int sides_at (void *context, double t, double *value, pw_error *error) {
 static const pw_source *sides_source (const pw_run *r, int i) {
   const pw_source *x = r->w->source;
   for (;; x++) {
-    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL) continue;
+    if (!pw_source_has_conditions (x)) continue;
     i -= x->signal.function.sides (x->signal.function.context, 0, NULL, r->sides->now);
     if (i < 0) return x;
   }
@@ -151,7 +151,7 @@ int pw_sides_follow (pw_run *r, double t0, pw_error *error) {
 int pw_sides_open (pw_run *r, pw_error *error) {
   int count = 0, reads = 0;
   for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
-    if (x->signal.type != PW_FUNCTION || x->signal.function.sides == NULL || x->reads == 0) continue;
+    if (!pw_source_has_conditions (x)) continue;
     count += x->signal.function.sides (x->signal.function.context, 0, NULL, NULL);
     reads = x->reads > reads ? x->reads : reads;
   }
