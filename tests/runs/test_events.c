@@ -259,9 +259,18 @@ static double events_random (unsigned *state) {
 
 /* A vehicle of two segments with random masses, places, grips of both wheels, friction in the hinge, and stops
  * without restitution: how many bounces accumulate, each with new events of the wheels, depends on the tolerance. */
+static unsigned events_seed = 1;
+static int events_rolling; /* 1: the second wheel rolls, and slides on a circle; half of the limits oscillate */
+
+static pw_signal events_limit (unsigned *x, double value) {
+  if (!events_rolling || events_random (x) < 0.5) return (pw_signal){ .constant = value };
+  return (pw_signal){ PW_HARMONIC, .harmonic = { .amplitude = 0.5 * value * events_random (x),
+                                                 .omega = 5 * events_random (x),
+                                                 .offset = value } };
+}
+
 SCENE (events_vehicle) {
-  static unsigned seed = 1;
-  unsigned *x = &seed;
+  unsigned *x = &events_seed;
   const double d = 0.1 + 0.3 * events_random (x);
   pw_add_body (m,
                &(pw_body){ .name = "a", .mass = 0.5 + events_random (x), .inertia = 0.05 + 0.2 * events_random (x) });
@@ -271,14 +280,22 @@ SCENE (events_vehicle) {
                               .start = { 0.5 + d, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "a", "b" }, .at = { { 0.5 }, { -d } } });
   pw_add_wheel (
-      m,
-      &(pw_wheel){ .name = "A", .body = "a", .at = { -0.5 }, .grip = { .constant = 0.02 + 0.2 * events_random (x) } });
-  pw_add_wheel (
       m, &(pw_wheel){
-             .name = "C", .body = "b", .at = { 0.2, 0.02 }, .grip = { .constant = 0.05 + 0.4 * events_random (x) } });
+             .name = "A", .body = "a", .at = { -0.5 }, .grip = events_limit (x, 0.02 + 0.2 * events_random (x)) });
+  const double grip = 0.05 + 0.4 * events_random (x);
+  if (events_rolling)
+    pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "C",
+                                                  .body = "b",
+                                                  .at = { 0.2, 0.02 },
+                                                  .radius = 0.1,
+                                                  .inertia = 0.002 + 0.01 * events_random (x),
+                                                  .grip = events_limit (x, grip),
+                                                  .brake = events_limit (x, 0.03 * events_random (x)) });
+  else
+    pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "b", .at = { 0.2, 0.02 }, .grip = events_limit (x, grip) });
   pw_add_friction (m, &(pw_friction){ .name = "F",
                                       .body = { "a", "b" },
-                                      .limit = { .constant = 0.01 + 0.05 * events_random (x) },
+                                      .limit = events_limit (x, 0.01 + 0.05 * events_random (x)),
                                       .limit_sliding = { .constant = events_random (x) < 0.5 ? 0 : 0.005 } });
   pw_add_end_stop (m, &(pw_end_stop){ .name = "S",
                                       .body = { "a", "b" },
@@ -323,6 +340,30 @@ TEST (none_missed) {
     pw_system_free (s);
   }
   assert_true (total > 300);
+}
+
+/* The same with a rolling wheel, whose slip turns: two methods with different errors find the same events.  With fixed
+ * steps those nearer to each other than the zone in which the direction of sliding is smoothed are not compared. */
+TEST (rolling_wheels) {
+  static double time[2][400];
+  static int row[2][400];
+  int total = 0;
+  const unsigned seed = events_seed;
+  events_seed = 1, events_rolling = 1;
+  for (int i = 0; i < 12; i++) {
+    pw_system *s = scene_system (&events_vehicle_table, NULL);
+    const int count = events_of (s, "erk8+projection", 0, 3, time[0], row[0]);
+    assert_int_equal (events_of (s, "radau+ggl", 0, 3, time[1], row[1]), count);
+    for (int k = 0; k < count; k++) {
+      assert_int_equal (row[0][k], row[1][k]);
+      check_close (check_text ("scene %d, event %d", i, k), time[1][k], time[0][k], 1e-6,
+                   "1e-11, in directions that relax at the rate 1/sqrt (rtol)");
+    }
+    total += count;
+    pw_system_free (s);
+  }
+  events_seed = seed, events_rolling = 0;
+  assert_true (total > 150);
 }
 
 /* moreau, which locates none of these events, converges to the same motions with order 1: the mean error of many, since
