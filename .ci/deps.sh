@@ -23,7 +23,7 @@ for word; do
   reference) needs="$needs python3-numpy python3-scipy" ;;
   python)
     needs="$needs python3-numpy python3-pytest python3-matplotlib python3-jsonschema python3-pycparser python3-pandas python3-xarray"
-    needs="$needs python3-distributed python3-mpi4py" ;;
+    needs="$needs python3-distributed python3-mpi4py python3-mypy" ;;
   counts) needs="$needs valgrind" ;;
   page) needs="$needs clang wasm-ld wasi-libc wasi-builtins" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;

@@ -143,6 +143,15 @@ def test_options_of_analyses_have_names(call, text):
         call(pw.Model("pendulum"))
 
 
+def test_analyses_write_tables_and_figures(tmp_path):
+    model = pw.Model("pendulum")
+    compared = model.compare(t_end=0.5, methods="rk4", step_ladder="1e-2:1e-3", output=tmp_path / "c.csv")
+    assert set(compared["method"]) == {"rk4"} and (tmp_path / "c.csv").exists()
+    found = model.sensitivity(of="bob.x", by="l", t_end=1, every=0.5, output=tmp_path / "s.npz", plots=tmp_path)
+    table = np.load(tmp_path / "s.npz")
+    assert found["outputs"] and len(table["t"]) == 3 and list(tmp_path.glob("*.png"))
+
+
 def test_options_of_analyses_reach_the_command():
     model = pw.Model("pendulum")
     assert set(model.compare(t_end=0.5, methods=["rk4", "erk8"], rtol_ladder=(1e-6, 1e-8))["method"]) == {"rk4", "erk8"}

@@ -485,6 +485,30 @@ def test_sweep_has_the_values_of_the_program(tmp_path):
         assert np.array_equal(np.asarray(data[name]).ravel(), expected[name]), name
 
 
+def test_sweeps_have_outputs():
+    """A block of 1 kg with the force 1 N: x = x0 + t^2/2 reaches a stop at t1 = sqrt (2 (1 - x0)), mean of x' until then t1/2."""
+    block = pw.describe(bodies=[pw.Body("block", mass=1, inertia=1)],
+                        elements=[pw.Force("F", body="block", at=[0, 0], fx=1),
+                                  {"stop": "wall", "body": ["block", "ground"], "what": "x", "high": 1, "restitution": 0.5}])
+    x0 = np.array([0.0, 0.36])
+    data = block.sweep({"block.x": x0}, method="erk8", rtol=1e-10, t_end=2,
+                       of=["event:wall", "events:wall", "max:block.vx", "at 0.5:block.x - 0.125"])
+    t1 = np.sqrt(2 * (1 - x0))
+    assert np.asarray(data["event:wall"]) == pytest.approx(t1, abs=1e-9) and (np.asarray(data["events:wall"]) >= 1).all()
+    assert np.asarray(data["max:block.vx"]) == pytest.approx(t1, abs=1e-9)
+    assert np.asarray(data["at 0.5:block.x - 0.125"]) == pytest.approx(x0, abs=1e-9)
+    stopped = block.replace(start={"block.x": 0.1}).sweep({"block.x": x0}, method="erk8", rtol=1e-10, until="block.vx > 0.5", t_end=2)
+    assert np.asarray(stopped["t"]) == pytest.approx([0.5, 0.5], abs=1e-9) and list(np.asarray(stopped["failed"])) == ["", ""]
+    failed = block.sweep({"block.x": x0}, of="max:block.vx", method="erk8", max_steps=1)
+    assert all("max" in why for why in np.asarray(failed["failed"])) and np.isnan(np.asarray(failed["max:block.vx"])).all()
+    for options, text in (({"of": "max:block.xx"}, "block.vx|block.x"), ({"of": "t", "executor": 1}, "together with executor"),
+                          ({"of": "t", "energie": True}, 'no option "--energie"')):
+        with pytest.raises(pw.InputError, match=text):
+            block.sweep({"block.x": x0}, **options)
+    with pytest.raises(pw.InputError, match="functions in Python"):
+        pw.Model("ezyroller", signals={"rider": math.cos}).sweep({"a": [0.5]}, of="t")
+
+
 def test_a_sweep_of_which_all_runs_fail_has_its_columns():
     data = pw.sweep("snakeboard", {"swing": [0.1, 0.2]}, method="erk8", max_steps=3, t_end=1, energy=True)
     good = pw.sweep("snakeboard", {"swing": [0.1, 0.2]}, method="erk8", t_end=1, energy=True)
@@ -583,6 +607,21 @@ def test_linearise():
     l = pw.Model("pendulum", theta=-math.pi / 2, l=2.0, g=8.0).linearise()
     assert l.steady and sorted(l.eigenvalues.imag) == pytest.approx([-2, 2], abs=1e-12)
     assert np.linalg.eigvals(l.A).imag.max() == pytest.approx(2, abs=1e-12)
+    assert l.basis.shape == (len(l.states), 2)
+
+
+def test_linearise_at_a_steady_motion():
+    """The trailers, of 0.6 and 0.8 m, behind a tractor on a straight line at 2 m/s fall in line as exp (-2 t/length)."""
+    trailers, hold = pw.Model("n-trailer"), {"tractor.vx": 2, "tractor.vy": 0, "tractor.omega": 0}
+    start = trailers.replace(start={f"{body}.phi": 0 for body in trailers.bodies})
+    l = start.linearise(steady=True, hold=hold)
+    assert l.steady and l.A.shape == (7, 7) and l.basis.shape == (len(l.states), 7) and l.B.shape == (7, len(l.inputs))
+    for eigenvalues in (l.eigenvalues, np.linalg.eigvals(l.A)):
+        assert sorted(eigenvalues.real)[:2] == pytest.approx([-2 / 0.6, -2 / 0.8], abs=1e-9)
+    same = trailers.linearise()
+    assert l.states == same.states and l.inputs == same.inputs
+    with pytest.raises(pw.InputError, match="raise `most`"):
+        start.linearise(most=3, hold=hold)
 
 
 def test_commands():

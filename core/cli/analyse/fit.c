@@ -973,7 +973,8 @@ static int fit_command (void *options, pw_error *error) {
 static const struct poptOption fit_options_table[] = {
   PW_OPTION_GROUP ("Fit"),
   PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
-                  "Measured data: a table with t and columns named as those of `run`; empty cells are gaps"),
+                  "Measured data, used up to --t-end: a table with t and columns named as those of `run`; empty cells "
+                  "are gaps"),
   PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
   PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
   PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
@@ -991,15 +992,7 @@ static const struct poptOption fit_options_table[] = {
   PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
   PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
   PW_WIDTH_OPTION,
-  PW_OPTION_GROUP ("Integration"),
-  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
-                  "Integrator and stabilisation, see `pinwheel list methods`"),
-  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Leave out data after this time [s]"),
-  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"),
-  PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A", "Absolute tolerance of every state"),
-  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop a run after this much processor time"),
-  PW_ENGINE_OPTION,
+  PW_METHOD_OPTIONS,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -167,6 +167,9 @@ class Linear:
     twist: np.ndarray
 
 
+_TOO_MANY = "too many coordinates to linearise: raise `most`"
+
+
 class Feedback:
     """A signal that is a function of the time and of states: ``pw.Feedback(lambda t, x: -0.5 * x[0], ["steer.phi"])``.
 
@@ -548,15 +551,19 @@ class Model(studies.Analyses):
 
     # ---- Analyses ----
 
-    def linearise(self, at: float = 0.0, most: int = 200) -> Linear:
+    def linearise(self, at: float = 0.0, most: int = 200, *, steady: bool = False, hold: dict | None = None) -> Linear:
         """Linearises the equations of motion in the frame that moves with the motion.
 
         Parameters
         ----------
         at : float
-            Time of a run with the model's method [s].
+            Time of a run with the model's method [s]; of a steady motion, that at which signals are evaluated.
         most : int
             Refuse models with more minimal coordinates.
+        steady : bool
+            Linearise at the steady motion that is reached from the initial state, by the program.
+        hold : dict, optional
+            Values of states, or of BODY.speed, .radius or .curvature, that this motion has.
 
         Returns
         -------
@@ -569,6 +576,8 @@ class Model(studies.Analyses):
         at, most = lib.number(at, "at"), int(lib.number(most, "most", above=0))
         if not 0 <= at < math.inf:
             raise lib.InputError(f"at = {at!r}: expected a time >= 0")
+        if steady or hold:
+            return self._linear_steady(studies.command("linearise", self, at=at, steady=True, hold=hold), most)
         with self.open(t_end=at or None) as simulation:
             if at:
                 simulation.advance(at)
@@ -582,20 +591,29 @@ class Model(studies.Analyses):
 
     sweep = studies.sweep
 
-    @staticmethod
-    def _linear(linear, system):
+    def _linear_steady(self, found, most) -> Linear:
+        """The JSON of the program's command as a Linear."""
+        A, inputs, states = np.array(found["A"]), list(self.inputs), list(self.states)
+        if len(A) > most:
+            raise lib.InputError(_TOO_MANY)
+        B = np.full((len(A), len(inputs)), np.nan)
+        B[:, [inputs.index(u["name"]) for u in found["inputs"]]] = np.array(found["B"]).reshape(len(A), -1)
+        return Linear(A, B, np.array([complex(x["re"], x["im"]) for x in found["eigenvalues"]]), np.array(found["C"]), inputs, states,
+                      found["motion"] == "steady", np.array(found["twist"]))
+
+    def _linear(self, linear, system) -> Linear:
+        """The library's linearisation as a Linear."""
         if not linear.A:
-            raise lib.InputError("too many coordinates to linearise: raise `most`")
-        n, states = linear.unknowns, 2 * lib.core.pw_system_coordinates(system)
-        inputs = [lib.name_of(lib.core.pw_system_signal_name, system, i) for i in range(lib.core.pw_system_signals(system))]
+            raise lib.InputError(_TOO_MANY)
+        n, rows, inputs = linear.unknowns, 2 * lib.core.pw_system_coordinates(system), list(self.inputs)
+        shown = [i for i in range(rows) if not lib.core.pw_system_state_hidden(system, i)]
 
         def matrix(pointer, rows, columns):
             return np.ctypeslib.as_array(pointer, (rows, columns)).copy() if rows * columns else np.zeros((rows, columns))
 
         return Linear(matrix(linear.A, n, n), matrix(linear.B, n, len(inputs)),
-                      np.array([complex(linear.re[i], linear.im[i]) for i in range(n)]), matrix(linear.basis, states, n), inputs,
-                      [lib.name_of(lib.core.pw_system_state_name, system, i) for i in range(states)], linear.steady == lib.PW_STEADY,
-                      np.array(linear.twist))
+                      np.array([complex(linear.re[i], linear.im[i]) for i in range(n)]), matrix(linear.basis, rows, n)[shown], inputs,
+                      list(self.states), linear.steady == lib.PW_STEADY, np.array(linear.twist))
 
 
 @functools.wraps(studies.sweep, assigned=["__doc__"])  # with its own module, by which it is pickled

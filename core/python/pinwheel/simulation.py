@@ -10,6 +10,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, MutableMapping
+from typing import Any
 
 import numpy as np
 
@@ -164,7 +165,7 @@ class Simulation:
     ...     simulation.advance(0.01)
     """
 
-    _run = None  # a closed run
+    _run: Any = None  # a closed run
     _cancelled = staticmethod(lambda: False)  # asked between calls of the library; True: ends the run as Ctrl-C does
 
     def __init__(self, model, system, method, settings, given, stacklevel=4):

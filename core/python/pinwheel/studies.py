@@ -11,6 +11,7 @@ import itertools
 import json
 import os
 import pathlib
+import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar, Union, cast
@@ -124,7 +125,8 @@ def _specialise(model, runs, method, end, settings):
 
 
 def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None = None,
-          executor: concurrent.futures.Executor | None = None, progress=None, error: bool = False, **settings):
+          of=None, until: str | None = None, limit: float | None = None, executor: concurrent.futures.Executor | None = None,
+          progress=None, error: bool = False, **settings):
     """Runs a model for all combinations of values; the last one varies fastest.
 
     Parameters
@@ -134,6 +136,12 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
         Values of parameters and initial states: ``{"swing": [0.3, 0.6], "board.vx": np.linspace(0, 1, 5)}``.
     method, t_end, **settings
         As in :meth:`Model.run`.
+    of : str or list of str, optional
+        Outputs of the runs: "max:A.N", "events:stop", "event:stop", "at 2:board.x", "board.x / rider.work", ...
+    until : str, optional
+        A condition on columns, "car.x > 10", at whose instant a run ends.
+    limit : float, optional
+        Most processor time of a run [s].
     executor : concurrent.futures.Executor, optional
         Threads on all processors by default; process pools, Dask clients' and mpi4py's executors work too.
     progress : callable or bool, optional
@@ -144,15 +152,24 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     Returns
     -------
     xarray.Dataset or dict of ndarray
-        Final values by name, with units, shape (len of each varied name); "failed" contains the reason of a run that
-        failed, or "".
+        Final values and outputs by name, with units, shape (len of each varied name); "failed" contains the reason of a
+        run that failed, or "".
 
     Raises
     ------
     InputError
         For a value that the model refuses; runs that fail only leave NaN.
+
+    Notes
+    -----
+    With of, until or limit the program makes the sweep, on all processors: without executor, progress, functions in Python.
     """
     names, values, points = _points(vary)
+    if any(given is not None for given in (of, until, limit)):
+        if executor is not None:
+            raise lib.InputError("of, until and limit are for sweeps on all processors: they cannot be given together with executor")
+        return _table(dict(zip(names, values)), _outputs(model, dict(zip(names, values)), {
+            "of": of, "until": until, "limit": limit, "method": method, "t_end": t_end, "error": error, **settings}), model.units)
     end = model.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
     method = model.defaults["method"] if method is None else method
     settings["specialise"], lanes = _specialise(model, len(points), method, end, dict(settings))
@@ -175,6 +192,26 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
         if executor is None:
             pool.shutdown(cancel_futures=True)
     return _table(dict(zip(names, values)), blocks, model.units)
+
+
+def _outputs(model, values, options):
+    """What _runs returns, from the table of the program's sweep.  values: those varied, by name."""
+    model = model.replace()
+    for given in (model._given, model.start):
+        for name in values.keys() & given:
+            del given[name]
+    with tempfile.TemporaryDirectory() as made:
+        path = pathlib.Path(made) / "sweep.json"
+        try:
+            _report("sweep", model, (), {**options, "vary": {name: v.tolist() for name, v in values.items()}, "output": path}, False)
+        except lib.Error:  # also if all runs have failed
+            if not path.exists():
+                raise
+        table = {tuple(re.findall(r"(.*?)(?: \[(.*)\])?$", name)[0]): column for name, column in _json_of(path).items()}
+    status, reasons = (table.pop((name, "")) for name in ("status", "reason"))
+    units = dict(list(table)[len(values):])  # by name, without those varied
+    rows = np.array([column for _, column in list(table.items())[len(values):]], float).T
+    return [(units, rows, [why or "" if ended != "ok" else "" for ended, why in zip(status, reasons)])]
 
 
 def _table(values, blocks, units):
@@ -237,20 +274,36 @@ def help_of(name: str) -> str:
     return _program.run([lib.encode(name, "command").decode(), "--help"]).stdout
 
 
-_RUN_OPTIONS = """method, t_end, step, rtol, atol, max_steps, limit, jobs, specialise : optional
-            Integrator, final time [s], step size [s], tolerances, most attempted steps, processor time of a run [s], number of
-            concurrent runs, and when to compile code, as on the command line."""
-_RAISES = """Raises
-        ------
-        InputError, InitialError, MethodError, ResourceError
-            With the program's message."""
-
+# Parameters that several analyses have; a method's docstring describes the others.
+_COMMON = {
+    "method": "str, optional\n    Integrator and stabilisation; default: the model's.",
+    "t_end": "float, optional\n    Final time [s].",
+    "step": "float, optional\n    Step size of methods with fixed steps [s].",
+    "rtol": "float, optional\n    Relative tolerance of adaptive methods.",
+    "atol": "float, optional\n    Absolute tolerance of every state.",
+    "max_steps": "int, optional\n    Most attempted steps of adaptive methods.",
+    "limit": "float, optional\n    Most processor time of a run, or of a search for motions [s].",
+    "jobs": "int, optional\n    Number of concurrent runs; default: one for each processor.",
+    "specialise": '{"auto", "always", "never"}, optional\n    When to compile code for this model alone.',
+    "until": "str, optional\n    A condition at whose instant runs end.",
+    "starts": "int, optional\n    Number of points from which to search.",
+    "vary": 'dict, optional\n    A parameter, and its first and last value: ``{"m1": (1, 5)}``.',
+    "methods": 'str or list of str, optional\n    Methods, "rk4+all".',
+    "output": "path, optional\n    A table to write: .csv, .npz or .json.",
+    "plots": "path, optional\n    A folder for figures.",
+}
+_RETURNS = "dict\n    The command's JSON."
+_TABLE = "dict\n    Columns of the table: arrays of shape (rows,), with units in their names."
+_RAISES = "InputError, InitialError, MethodError, ResourceError\n    With the program's message."
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
 
 def _analysis(function: _Method) -> _Method:
-    """A method that runs the command of its name; each argument that is not None is the option of its name."""
+    """A method that runs the command of its name; each argument that is not None is the option of its name.
+
+    Its docstring begins with what it does and the parameters that are not in _COMMON; the rest is added.
+    """
     signature = inspect.signature(function)
     name = function.__name__
 
@@ -263,12 +316,18 @@ def _analysis(function: _Method) -> _Method:
         del given["self"]
         return _report(name, self, (), given, tables=True)
 
-    method.__doc__ = (function.__doc__ or "").replace("RUN", _RUN_OPTIONS).replace("RAISES", _RAISES)
+    about, _, described = inspect.cleandoc(function.__doc__ or "").partition("\n\n")
+    own = re.findall(r"\w+", " ".join(line.split(" : ")[0] for line in described.splitlines() if " : " in line))
+    listed = [described] * bool(described) + [f"{p} : {_COMMON[p]}" for p in signature.parameters if p != "self" and p not in own]
+    returned = _TABLE if name in ("compare", "drift") else _RETURNS
+    sections = {"Parameters": "\n".join(listed), "Returns": returned, "Raises": _RAISES}
+    method.__doc__ = "\n\n".join([about] + [f"{title}\n{'-' * len(title)}\n{text}" for title, text in sections.items() if text])
     return cast(_Method, method)
 
 
 _Names = Union[str, Sequence[str]]
 _Free = Union[_Names, Mapping[str, Any]]
+_Path = Union[str, "os.PathLike[str]"]
 
 
 class Analyses:
@@ -276,146 +335,76 @@ class Analyses:
 
     @_analysis
     def check(self) -> dict:  # type: ignore[empty-body]
-        """Checks mobility, redundancy, initial conditions, derivatives and stability.
-
-        Returns
-        -------
-        dict
-            The command's JSON.
-
-        RAISES
-        """
+        """Checks mobility, redundancy, initial conditions, derivatives and stability."""
 
     @_analysis
     def compare(self, *, methods: _Names | None = None, t_end: float | None = None, limit: float | None = None,  # type: ignore[empty-body]
                 repeats: int | None = None, jobs: int | None = None, rtol_ladder: tuple | str | None = None,
-                step_ladder: tuple | str | None = None, reference: str | None = None, specialise: str | None = None) -> dict:
+                step_ladder: tuple | str | None = None, reference: _Path | None = None, specialise: str | None = None,
+                output: _Path | None = None, plots: _Path | None = None) -> dict:
         """Compares the accuracy and cost of methods against a reference solution.
 
-        Parameters
-        ----------
-        methods : str or list of str, optional
-            Methods, "rk4,erk8".
-        t_end, limit, specialise : optional
-            Final time [s], processor time of a run [s], when to compile code.
-        repeats, jobs : int, optional
-            Timed repetitions of each run; methods that run at a time.
+        repeats : int, optional
+            Timed repetitions of each run.
         rtol_ladder, step_ladder : pair of float, optional
             First and last tolerance of adaptive methods, and step of others.
-        reference : str, optional
-            The path of a table with which runs are compared.
-
-        Returns
-        -------
-        dict
-            Columns of the table: arrays of shape (rows,), with units in their names.
-
-        RAISES
+        reference : path, optional
+            A table with which runs are compared.
         """
 
     @_analysis
     def drift(self, *, methods: _Names | None = None, t_end: float | None = None, step: float | None = None,  # type: ignore[empty-body]
               rtol: float | None = None, max_steps: int | None = None, limit: float | None = None, jobs: int | None = None,
-              vary: Mapping[str, Any] | None = None, only_methods: bool = False, specialise: str | None = None) -> dict:
+              vary: Mapping[str, Any] | None = None, only_methods: bool = False, specialise: str | None = None,
+              output: _Path | None = None, plots: _Path | None = None) -> dict:
         """Compares the drift of constraints and energy in long runs, by stabilisation.
 
-        Parameters
-        ----------
-        methods : str or list of str, optional
-            Methods, "rk4+all".
         vary : dict, optional
-            Values of an option of stabilisations.
+            Values of an option of stabilisations: ``{"alpha": [1, 10]}``.
         only_methods : bool
             Leave out how drift depends on options.
-        t_end, step, rtol, max_steps, limit, jobs, specialise : optional
-            As in :meth:`sensitivity`.
-
-        Returns
-        -------
-        dict
-            Columns of the table: arrays of shape (rows,), with units in their names.
-
-        RAISES
         """
 
     @_analysis
     def steady(self, *, hold: Mapping[str, float] | None = None, vary: Mapping[str, Any] | None = None,  # type: ignore[empty-body]
-               starts: int | None = None, at: float | None = None, limit: float | None = None) -> dict:
-        """Finds steady motions, and follows them over a parameter.
+               starts: int | None = None, at: float | None = None, limit: float | None = None, output: _Path | None = None,
+               plots: _Path | None = None) -> dict:
+        """Finds steady motions, and follows them over a parameter or a held value.
 
-        Parameters
-        ----------
         hold : dict, optional
             Values of states, or of BODY.speed, .radius or .curvature, that the motions have.
-        vary : dict, optional
-            A parameter, or a held value, and the first and last value: ``{"m1": (1, 5)}``.
-        starts : int, optional
-            Number of random states from which motions are sought.
         at : float, optional
             Time at which signals are evaluated [s].
-        limit : float, optional
-            Processor time [s].
-
-        Returns
-        -------
-        dict
-            The command's JSON.
-
-        RAISES
         """
 
     @_analysis
     def periodic(self, *, period: float | str | None = None, periods: int | None = None, guess: float | None = None,  # type: ignore[empty-body]
                  vary: Mapping[str, Any] | None = None, method: str | None = None, rtol: float | None = None,
-                 limit: float | None = None) -> dict:
+                 limit: float | None = None, output: _Path | None = None, plots: _Path | None = None) -> dict:
         """Finds periodic motions, and follows them over a parameter.
 
-        Parameters
-        ----------
         period : float or "free", optional
             [s]; by default that of the signals.
         periods : int, optional
             Number of periods of the signals after which the motion repeats.
         guess : float, optional
             First guess of a free period [s].
-        vary : dict, optional
-            A parameter, and its first and last value.
-        method, rtol, limit : optional
-            Adaptive integrator, its tolerance, processor time [s].
-
-        Returns
-        -------
-        dict
-            The command's JSON.
-
-        RAISES
         """
 
     @_analysis
     def sensitivity(self, of: _Names, by: _Names, *, every: float | None = None, until: str | None = None,  # type: ignore[empty-body]
                     method: str | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
                     atol: float | None = None, max_steps: int | None = None, limit: float | None = None,
-                    jobs: int | None = None, specialise: str | None = None) -> dict:
+                    jobs: int | None = None, specialise: str | None = None, output: _Path | None = None,
+                    plots: _Path | None = None) -> dict:
         """Differentiates outputs of a run with respect to parameters and initial values.
 
-        Parameters
-        ----------
         of : str or list of str
             Columns at the end, or outputs such as "max:board.x".
         by : str or list of str
             Parameters, initial values of states.
         every : float, optional
-            Time between rows of the table [s].
-        until : str, optional
-            A condition at whose instant runs end.
-        RUN
-
-        Returns
-        -------
-        dict
-            The command's JSON.
-
-        RAISES
+            Time between rows of the table [s], which ``output`` writes.
         """
 
     @_analysis
@@ -423,11 +412,10 @@ class Analyses:
             confidence: float | None = None, starts: int | None = None, time: str | None = None,
             time_scale: float | None = None, time_offset: float | None = None, method: str | None = None,
             t_end: float | None = None, step: float | None = None, rtol: float | None = None, atol: float | None = None,
-            limit: float | None = None, jobs: int | None = None, specialise: str | None = None) -> dict:
-        """Fits parameters and initial values to measured data.
+            max_steps: int | None = None, limit: float | None = None, jobs: int | None = None, specialise: str | None = None,
+            output: _Path | None = None, plots: _Path | None = None) -> dict:
+        """Fits parameters and initial values to measured data, up to t_end if that is given.
 
-        Parameters
-        ----------
         data : dict of arrays, DataFrame or path
             Times "t", and columns with the names of results; NaN: not measured.
         columns : str or list of str
@@ -438,20 +426,10 @@ class Analyses:
             Standard deviations of columns: numbers, or names of columns of the data.
         confidence : float, optional
             Probability of confidence intervals.
-        starts : int, optional
-            Number of points from which to search.
         time : str, optional
             Column of the times.
         time_scale, time_offset : float, optional
             Factor of these times, and what is added to them [s].
-        RUN
-
-        Returns
-        -------
-        dict
-            The command's JSON.
-
-        RAISES
         """
 
     @_analysis
@@ -459,29 +437,20 @@ class Analyses:
                  subject_to: _Names | None = None, starts: int | None = None, seed: int | None = None, until: str | None = None,
                  method: str | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
                  atol: float | None = None, max_steps: int | None = None, limit: float | None = None,
-                 jobs: int | None = None, specialise: str | None = None) -> dict:
+                 jobs: int | None = None, specialise: str | None = None, output: _Path | None = None,
+                 plots: _Path | None = None) -> dict:
         """Finds the parameters for which an output is largest or smallest.
 
-        Parameters
-        ----------
         free : dict, str or list of str
             Unknowns, with bounds: ``{"theta": (-1, 1)}``.
         maximise, minimise : str
             One of them: an output such as "max:bob.vx", or an expression of outputs.
         subject_to : str or list of str, optional
             Constraints, "max:B.Fx <= 10".
-        starts, seed : int, optional
-            Number of points from which to search, and the seed of their choice.
-        until : str, optional
-            A condition at whose instant runs end.
-        RUN
-
-        Returns
-        -------
-        dict
-            The command's JSON.
-
-        RAISES
+        seed : int, optional
+            Seed of the choice of starts.
+        output : path, optional
+            A file .yaml to write, with the optimum.
         """
 
 
@@ -496,10 +465,14 @@ def _report(name, model, arguments, options, tables):
         if wanted and not any(word.split("=")[0] in ("-o", wanted.split("=")[0]) for word in words):
             words.append(wanted)
         text = _program.run(words).stdout
-        report, table = folder / f"{name}.json", folder / f"{name}.csv"
+        report, table = folder / f"{name}.json", pathlib.Path(options.get("output") or folder / f"{name}.csv")
         if report.exists():
-            return json.loads(report.read_text(encoding="utf-8"))
+            return _json_of(report)
         return _columns(table) if tables and table.exists() else text
+
+
+def _json_of(path):
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _output(name, described, folder, tables):

@@ -58,13 +58,13 @@ class VectorSimulation:
         self.n = _count(n, "n")
         varied = {name: array(values, (self.n,), f"parameter {name}") for name, values in (parameters or {}).items()}
         models = [model.replace(**{name: values[i] for name, values in varied.items()}) for i in range(self.n)] if varied else [model]
-        system, method, settings, _ = models[0]._prepare(
+        system, chosen, settings, _ = models[0]._prepare(
             self.n, 3, method, t_end, step, rtol, atol, max_steps, energy, inputs, specialise)
         systems = [m._compile(inputs) for m in models] if varied else [system] * self.n
         if not all(s.has_columns_of(system, energy) for s in systems):
             raise lib.InputError("parameters: the vehicles must have the same bodies and elements")
-        lanes = system.lanes() if settings.specialised and self.n > 1 and not adaptive(method) else None
-        self._ensemble = Ensemble(systems, method, settings, _count(threads or os.cpu_count(), "threads"), lanes)
+        lanes = system.lanes() if settings.specialised and self.n > 1 and not adaptive(chosen) else None
+        self._ensemble = Ensemble(systems, chosen, settings, _count(threads or os.cpu_count(), "threads"), lanes)
         self.inputs, self.states, self._settings = list(system.inputs), self._ensemble.states, settings
         self._initial_inputs, self._times = np.array(list(system.inputs.values())), self._ensemble.plan("t")
         self.random = [np.random.default_rng(seed) for seed in np.random.SeedSequence().spawn(self.n)]
@@ -117,14 +117,13 @@ class VectorSimulation:
         return {name: values if np.ndim(values) == 0 else array(values, (self.n,), f"state {name}")[i] for name, values in state.items()}
 
     def step(self, inputs=None, dt: float | None = None) -> None:
-        """Sets inputs and advances all vehicles that have not failed.
+        """Sets inputs and advances all vehicles that have not failed, as :meth:`Simulation.step` does one.
 
         Parameters
         ----------
         inputs : array_like, shape (n, len(inputs)), or (n,) if there is one; optional
-            Constant during the step; by default those of the step before.
         dt : float, optional
-            Duration [s]; by default the step size of the method.
+            [s]
 
         Raises
         ------
@@ -137,17 +136,15 @@ class VectorSimulation:
         self._ensemble.step(duration(dt, self._settings.step))
 
     def observe(self, names=None) -> np.ndarray:
-        """Columns at the times reached.
+        """Columns at the times reached, as those of :meth:`Simulation.observe`; NaN for vehicles that have failed.
 
         Parameters
         ----------
         names : sequence of str, optional
-            Names of columns, as in :class:`Result`; by default, the states.  A tuple is looked up fastest.
 
         Returns
         -------
         ndarray, shape (n, len(names))
-            An array that the next call with these names overwrites; NaN for vehicles that have failed.
         """
         store, values, _ = self._ensemble.plan(self.states if names is None else names)
         store()
