@@ -251,6 +251,8 @@ typedef struct {
    * and v at time t: three for each body in the order they were added, then the internal coordinates of elements in the
    * order of pw_system_element.  All entries are NaN (unknown) before the call. */
   void (*reference) (const void *parameters, double t, double *q, double *v);
+
+  const struct pw_method *const *methods; /* integration methods (pinwheel-method.h), ended by NULL; may be NULL */
 } pw_plugin_table;
 
 /* Ends a model file:  PW_MODEL (.about = "...", .parameters = ..., .build = build) */

@@ -1,7 +1,8 @@
 /* An integration method of your own: that of Kutta of order 3; measures its order on a pendulum with a known motion.
  * From the source tree, after `make`:
  *     cc -std=c11 -Ibuild/include docs/method.c -o method -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
- * with an installed Pinwheel as docs/embed.c.  For `pinwheel compare` compile a method into Pinwheel (adding.md). */
+ * with an installed Pinwheel as docs/embed.c.  Its last line makes it a file of methods for commands, too:
+ *     pinwheel compare ezyroller --method-file docs/method.c */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel-files.h"
@@ -91,3 +92,5 @@ int main (void) {
   if (e.status != PW_OK) fprintf (stderr, "method: %s\n", e.text);
   return -e.status;
 }
+
+PW_METHOD_FILE (methods);

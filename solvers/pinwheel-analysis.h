@@ -212,9 +212,10 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 double pw_system_period (const pw_system *s);
 
 typedef struct {
-  const char *method;          /* default "erk8+projection" */
-  double rtol;                 /* default 1e-12 */
-  int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY, reason "stopped"; or NULL */
+  const char *method;              /* default "erk8+projection" */
+  const pw_method *const *methods; /* as in pw_settings */
+  double rtol;                     /* default 1e-12 */
+  int (*stop) (void *context);     /* as in pw_settings, but a stop counts as PW_RETRY, reason "stopped"; or NULL */
   void *stop_context;
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */

@@ -1,7 +1,8 @@
 /* Integration methods of your own, compiled against the installed headers (docs/method.c is an example).
  *
- * A method is a const pw_method table (pinwheel-solvers.h).  A program passes its tables in pw_settings.methods;
- * their names, other than those of built-in methods, then work in pw_run_open, with stabilisations and options.  The
+ * A method is a const pw_method table (pinwheel-solvers.h).  A program passes its tables in pw_settings.methods, and a
+ * file ends with PW_METHOD_FILE; their names, other than those of built-in methods, then work in pw_run_open and in
+ * commands with --method-file FILE.c, with stabilisations and options.  The
  * run makes the initial state consistent, evaluates it, calls `open`, then `advance` for each step, which must not pass
  * t_end or the next discontinuity and ends with pw_step_accept.  It monitors constraints and energy, and evaluates the
  * state again before it calls `restart` after a discontinuity.
@@ -75,6 +76,9 @@ void pw_step_close (pw_run *r);
 void pw_step_serialise (pw_run *r, pw_archive *a);
 #define PW_STEP_FUNCTIONS \
   .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .serialise = pw_step_serialise
+
+/* Ends a file of methods for `pinwheel --method-file`; `methods` is an array of const pw_method *, ended by NULL. */
+#define PW_METHOD_FILE(methods_) PW_MODEL (.methods = (methods_))
 
 PW_END
 

@@ -76,9 +76,10 @@ extern const pw_method *const pw_methods[];
  * evaluated; PW_STOPPED if settings->stop requests it; PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
-/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation,
- * each unless its pointer is NULL. */
-int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
+/* Checks name and options of a method, built-in or one of `own` (as pw_settings.methods; NULL: none), without a system;
+ * returns integrator and index of the stabilisation, each unless its pointer is NULL. */
+int pw_method_parse (const char *method, const pw_method *const *own, const pw_method **integrator, int *stabilisation,
+                     pw_error *error);
 
 /* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed.
  * integrator: that of pw_method_parse; method: the text. */

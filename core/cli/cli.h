@@ -128,15 +128,18 @@ typedef struct {
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
+  const char **method_files;
   const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width, *until;
   const char *table, *json, *plots; /* -o, --json, --plots of PW_RESULTS_OPTIONS */
   pw_cli_model m;                   /* opened by pw_cli_open */
   pw_files files;                   /* opened by pw_files_open */
+  const pw_method **methods;        /* of --method-file, which pw_cli_file opens; ended by NULL, or NULL */
   pw_arena arena;
   /* private */
   poptContext popt;
   struct poptOption *options; /* a copy of the command's options, bound to its structure */
   void **text;                /* the text or list that popt allocated for each option */
+  pw_file **method_file;      /* ended by NULL, or NULL */
 } pw_cli_line;
 
 typedef struct {
@@ -196,11 +199,14 @@ PW_COMMANDS (PW_COMMAND)
       pw_cli_line, specialise, "specialise", 0, "WHEN",                                                     \
       "Compile code for this scene alone, which runs faster: auto (if the runs are long enough, default), " \
       "always or never")
+#define PW_METHOD_FILE_OPTION                                            \
+  PW_LIST_OPTION (pw_cli_line, method_files, "method-file", 0, "FILE.c", \
+                  "Compile methods of your own, which end with PW_METHOD_FILE, and use them by name; repeatable")
 #define PW_METHOD_OPTIONS                                                           \
   PW_OPTION_GROUP ("Integration"),                                                  \
       PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",                 \
                       "Integrator and stabilisation, see `pinwheel list methods`"), \
-      PW_STEP_OPTIONS,                                                              \
+      PW_METHOD_FILE_OPTION, PW_STEP_OPTIONS,                                       \
       PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A",                            \
                       "Absolute tolerance of every state (default rtol times its scale)")
 
@@ -239,8 +245,9 @@ int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, p
  * else PW_METHOD with an error that names --limit. */
 int pw_cli_incomplete (const pw_cli_line *line, pw_error *error);
 
-/* 1 if the step size of a method follows a tolerance, 0 if it is fixed; -1 if there is no such method. */
-int pw_cli_adaptive (const char *method);
+/* 1 if the step size of a method, built-in or one of `own`, follows a tolerance, 0 if it is fixed; -1 if there is no
+ * such method. */
+int pw_cli_adaptive (const pw_method *const *own, const char *method);
 /* Prints notices of options without effect on a method; but --step and tolerances may be given together, as by scripts
  * that compare methods. */
 void pw_cli_report_unused (const char *method, const pw_cli_line *line);
@@ -423,8 +430,9 @@ void pw_fingerprint_number (pw_text *t, const char *key, const char *name, doubl
 /* Adds a line with the name of a file and a checksum of its contents.  PW_INPUT or PW_RESOURCE if it cannot be read. */
 int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
 /* Adds the first lines of the fingerprint of a run or sweep: `magic`, version, model, the checksum of its tables
- * (pw_fingerprint_tables) unless it is 0, method, span, step and tolerances.  Errors as of pw_fingerprint_file. */
-int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
+ * (pw_fingerprint_tables) unless it is 0, files of methods, method, span, step and tolerances.  Errors as of
+ * pw_fingerprint_file. */
+int pw_fingerprint_run (pw_text *t, const char *magic, const pw_cli_line *line, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error);
 /* Continues a checksum, 0 at first, with the tables in the signals of a model, and the points of its paths. */
 uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);

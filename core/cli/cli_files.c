@@ -267,11 +267,13 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
   return PW_OK;
 }
 
-int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
+int pw_fingerprint_run (pw_text *t, const char *magic, const pw_cli_line *line, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error) {
   pw_text_add (t, magic);
   pw_fingerprint_line (t, "version", NULL, PW_VERSION);
-  int status = pw_fingerprint_file (t, "model", pw_file_name (file), pw_file_path (file), error);
+  int status = pw_fingerprint_file (t, "model", pw_file_name (line->m.file), pw_file_path (line->m.file), error);
+  for (pw_file *const *f = line->method_file; status == PW_OK && f && *f; f++)
+    status = pw_fingerprint_file (t, "method-file", pw_file_name (*f), pw_file_path (*f), error);
   if (table_sum)
     pw_fingerprint_line (t, "tables", NULL, PW_PRINTED (40, "contents %016llx", (unsigned long long)table_sum));
   pw_fingerprint_line (t, "method", NULL, method);

@@ -131,6 +131,9 @@ static void command_close (pw_cli_line *line) {
   pw_files_close (&line->files);
   pw_arena_free (&line->arena);
   pw_cli_close_model (&line->m);
+  for (pw_file **f = line->method_file; f && *f; f++) pw_file_close (*f);
+  free (line->method_file);
+  free (line->methods);
   for (size_t i = 0; line->options && line->text && line->options[i].longName; i++) {
     char **list = (line->options[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? line->text[i] : NULL;
     for (; list && *list; list++) free (*list);
@@ -217,7 +220,8 @@ int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, p
                              .step = defaults->step,
                              .rtol = defaults->rtol,
                              .stop = pw_limit_over,
-                             .stop_context = limit };
+                             .stop_context = limit,
+                             .methods = line->methods };
   const struct {
     const char *option, *text;
     double *value;
@@ -240,15 +244,14 @@ int pw_cli_incomplete (const pw_cli_line *line, pw_error *error) {
   return PW_INTERRUPTED;
 }
 
-int pw_cli_adaptive (const char *method) {
+int pw_cli_adaptive (const pw_method *const *own, const char *method) {
   const pw_method *integrator;
-  int stabilisation;
-  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return -1;
+  if (pw_method_parse (method, own, &integrator, NULL, NULL) != PW_OK) return -1;
   return pw_method_adaptive (integrator, method);
 }
 
 void pw_cli_report_unused (const char *method, const pw_cli_line *line) {
-  int adaptive = pw_cli_adaptive (method);
+  int adaptive = pw_cli_adaptive (line->methods, method);
   if (adaptive == 1 && line->step && !line->rtol && !line->atol)
     pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
   if (adaptive == 0 && line->max_steps)
@@ -318,6 +321,47 @@ const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name) {
   return p && p->name ? p : NULL;
 }
 
+/* Checks method i of line->methods, of this file. */
+static int cli_check_method (const pw_cli_line *line, int i, const char *path, pw_error *error) {
+  static const char sign[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+  const char *name = line->methods[i]->name;
+  const pw_method *found;
+  if (name == NULL || *name == 0 || name[strspn (name, sign)] || strcmp (name, "all") == 0)
+    return pw_fail (error, PW_INPUT, "--method-file %s: a method is called \"%s\": expected letters, digits, _ and -%s",
+                    path, name ? name : "", name && strcmp (name, "all") == 0 ? ", but not all, which means each" : "");
+  if (pw_method_parse (name, line->methods, &found, NULL, error) != PW_OK) return error->status;
+  if (found == line->methods[i]) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--method-file %s: there is a method %s already; call this one otherwise", path,
+                  name);
+}
+
+/* Compiles the files of --method-file, and makes the list of their methods. */
+static int cli_method_files (pw_cli_line *line, pw_error *error) {
+  size_t files = 0, count = 0;
+  while (line->method_files && line->method_files[files]) files++;
+  if (files > 0 && (line->method_file = calloc (files + 1, sizeof *line->method_file)) == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t i = 0; i < files; i++) {
+    const char *path = line->method_files[i];
+    pw_error why = { 0 };
+    if ((line->method_file[i] = pw_file_open (path, &why)) == NULL)
+      return pw_fail (error, why.status, "--method-file: %s", why.text);
+    const pw_method *const *m = pw_file_table (line->method_file[i])->methods;
+    size_t more = 0;
+    while (m && m[more]) more++;
+    if (more == 0)
+      return pw_fail (error, PW_INPUT, "--method-file %s: there is no method: expected PW_METHOD_FILE (...) at its end",
+                      path);
+    const pw_method **list = realloc (line->methods, (count + more + 1) * sizeof *list);
+    if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    line->methods = list;
+    memcpy (list + count, m, (more + 1) * sizeof *list);
+    for (; more-- > 0; count++)
+      if (cli_check_method (line, (int)count, path, error) != PW_OK) return error->status;
+  }
+  return PW_OK;
+}
+
 int pw_cli_file (pw_cli_line *line, pw_error *error) {
   const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
   double size = PW_FILE_DEFAULT_BYTES >> 20;
@@ -326,7 +370,7 @@ int pw_cli_file (pw_cli_line *line, pw_error *error) {
   if (size > largest)
     return pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file, largest);
   line->m.file = pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
-  if (line->m.file == NULL) return error->status;
+  if (line->m.file == NULL || cli_method_files (line, error) != PW_OK) return error->status;
   pw_run_defaults *d = &line->m.defaults;
   *d = pw_file_table (line->m.file)->run;
   if (d->t_end == 0) d->t_end = 10;

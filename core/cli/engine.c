@@ -53,7 +53,8 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
 static const char *engine_lanes_obstacle (const pw_cli_engine *e, const pw_system *s, const char *method,
                                           const pw_run *r) {
   if (e->code == NULL) return "the general engine is in use, see --specialise";
-  if (pw_cli_adaptive (method) != 0) return "the method controls its step size";
+  const int adaptive = pw_cli_adaptive (NULL, method);
+  if (adaptive != 0) return adaptive > 0 ? "the method controls its step size" : "the method is not built-in";
   if (r == NULL) return "the scene's initial state is refused";
   if (pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
   return pw_system_has_lanes (s) ? NULL : "the scene has element types of its own, or signals that depend on the state";

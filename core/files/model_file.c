@@ -234,14 +234,13 @@ static int build_run (const build_command *cmd, char *const *word, const char *s
                     word[0], strsignal (WTERMSIG (outcome)));
   if (code != 0 || exit_code == 127)
     return pw_fail (error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", word[0],
-                    cmd->log ? "specialised code" : "the model file ", cmd->log ? "" : source,
+                    cmd->log ? "specialised code" : "the file ", cmd->log ? "" : source,
                     code ? strerror (code) : "not found",
                     cmd->for_page ? PAGE_TOOLS : "one, or name another in the environment variable CC");
   if (exit_code != 0 && cmd->log)
     return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0], cmd->log);
   if (exit_code != 0)
-    return pw_fail (error, PW_INPUT, "the model file %s does not compile; the messages of %s are above", source,
-                    word[0]);
+    return pw_fail (error, PW_INPUT, "%s does not compile; the messages of %s are above", source, word[0]);
   return PW_OK;
 }
 
@@ -356,7 +355,10 @@ static int model_load (void *context, const char *object, pw_error *error) {
   if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, model_reason (object));
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)
-    return pw_fail (error, PW_INPUT, "%s is not a Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
+    return pw_fail (error, PW_INPUT,
+                    "%s is not a Pinwheel model: a model file ends with PW_MODEL (...), one of integration methods "
+                    "with PW_METHOD_FILE (...)",
+                    f->path);
   return pw_plugin_check (f->table, f->path, error);
 }
 
@@ -397,10 +399,9 @@ static int model_open_path (pw_file *f, const char *shown, size_t max_bytes, pw_
 static int model_find_path (pw_file *f, const char *path, pw_error *error) {
   struct stat info;
   if (realpath (path, f->path) == NULL)
-    return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open the model file %s: %s", path,
-                    strerror (errno));
+    return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open %s: %s", path, strerror (errno));
   if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode))
-    return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", path, pw_not_regular (info.st_mode));
+    return pw_fail (error, PW_INPUT, "cannot open %s: %s", path, pw_not_regular (info.st_mode));
   return PW_OK;
 }
 

@@ -116,7 +116,7 @@ int pw_yaml_check_source (const pw_yaml *y, pw_error *error) {
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error) {
   const char *why;
   FILE *f = pw_open_input (path, &why);
-  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the model file %s: %s", y->path, why);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open %s: %s", y->path, why);
   int status = pw_read_rest (f, max_bytes, y->path, "the limit for a model unless --max-file raises it", &y->source,
                              &y->size, error);
   fclose (f);

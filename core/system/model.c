@@ -184,7 +184,7 @@ int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error
                     "%s was compiled for another Pinwheel (ABI %u, this one has %u; table of %zu bytes, here %zu): "
                     "recompile it",
                     what, t->abi, (unsigned)PW_ABI, t->size, sizeof *t);
-  if (t->build == NULL)
+  if (t->build == NULL && t->methods == NULL)
     return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", what);
   if (t->about && !pw_is_text (t->about))
     return pw_fail (error, PW_INPUT, "%s: .about is not text: expected UTF-8 without control characters", what);
@@ -360,6 +360,10 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
     return NULL;
   }
   if (pw_plugin_check (table, PW_PRINTED (200, "model %s", name), error) != PW_OK) return NULL;
+  if (table->build == NULL) {
+    pw_fail (error, PW_INPUT, "model %s contains integration methods, but no build function", name);
+    return NULL;
+  }
   pw_model *m = calloc (1, sizeof *m);
   if (m) {
     m->table = table;

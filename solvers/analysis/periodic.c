@@ -130,7 +130,8 @@ static pw_run *periodic_run (pw_periodic *x, double value, double rtol, const do
                                  .span = x->settings.period > 0 ? x->settings.period : x->T,
                                  .rtol = rtol,
                                  .stop = x->settings.stop,
-                                 .stop_context = x->settings.stop_context };
+                                 .stop_context = x->settings.stop_context,
+                                 .methods = x->settings.methods };
   x->why = (pw_error){ 0 };
   const pw_system *s = periodic_system (x, value);
   pw_run *r = s ? pw_run_open (s, x->settings.method, &settings, &x->why) : NULL;
@@ -625,7 +626,8 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
   const pw_system *s = x->s;
   const pw_method *integrator;
   int stabilisation;
-  if (pw_method_parse (x->settings.method, &integrator, &stabilisation, error) != PW_OK) return error->status;
+  if (pw_method_parse (x->settings.method, x->settings.methods, &integrator, &stabilisation, error) != PW_OK)
+    return error->status;
   if (!pw_method_adaptive (integrator, x->settings.method))
     return pw_fail (error, PW_INPUT,
                     "method %s: periodic motions need one that controls its steps, such as erk8+projection",

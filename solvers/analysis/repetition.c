@@ -78,7 +78,7 @@ pw_repetition *pw_repetition_open (const pw_system *s, const char *method, const
                                    const double *times, long count, pw_error *error) {
   const pw_method *integrator;
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
-  if (pw_method_parse (method, &integrator, NULL, error) != PW_OK) return NULL;
+  if (pw_method_parse (method, settings->methods, &integrator, NULL, error) != PW_OK) return NULL;
   if (count < 1 || times == NULL) {
     pw_fail (error, PW_INPUT, "no times at which runs are compared");
     return NULL;

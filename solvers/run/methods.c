@@ -141,11 +141,12 @@ int pw_parse_options (const char *text, const pw_method *const *own, const pw_me
   return PW_OK;
 }
 
-int pw_method_parse (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
+int pw_method_parse (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
+                     pw_error *error) {
   double values[PW_MAX_OPTIONS];
   const pw_method *found;
   int index;
-  return pw_parse_options (text, NULL, method ? method : &found, stabilisation ? stabilisation : &index, values, error);
+  return pw_parse_options (text, own, method ? method : &found, stabilisation ? stabilisation : &index, values, error);
 }
 
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */
@@ -158,7 +159,7 @@ int pw_method_adaptive (const pw_method *integrator, const char *method) {
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end) {
   const pw_method *integrator;
   int stabilisation;
-  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return 0;
+  if (pw_method_parse (method, s->methods, &integrator, &stabilisation, NULL) != PW_OK) return 0;
   if (!pw_method_adaptive (integrator, method)) return t_end / (s->step > 0 ? s->step : step);
   return t_end / (METHODS_STEP_RATIO * step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : PW_RTOL), 1 / METHODS_ORDER);
 }

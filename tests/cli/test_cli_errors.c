@@ -88,8 +88,9 @@ TEST (bad_lines) {
     { "run ezyroller --start frame.x=inf", "model ezyroller: start frame.x = inf: expected a finite number" },
     { "run ezyroller -o - --json -", "-o and --json cannot both write to standard output (-)" },
     { "run ezyroller -o ''", "the name of a file to write is empty" },
-    { "run @/nothere.c", "cannot open the model file @/nothere.c: No such file or directory" },
-    { "run @/", "cannot open the model file @/: it is a directory, not a regular file" },
+    { "run @/nothere.c", "cannot open @/nothere.c: No such file or directory" },
+    { "run @/", "cannot open @/: it is a directory, not a regular file" },
+    { "run pendulum --method-file @/nothere.c", "--method-file: cannot open @/nothere.c: No such file or directory" },
     { "show", "missing argument; usage: pinwheel show MODEL [OPTION...]" },
     { "show ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
     { "show ezyroller --at -1", "--at -1: expected a number >= 0" },
@@ -263,6 +264,34 @@ TEST (bad_files) {
   assert_non_null (strstr (cli_err, " does not compile; the messages of "));
   assert_int_equal (cli_run ("TMPDIR=@/notes.txt pinwheel run @/broken.c"), 1);
   assert_non_null (strstr (cli_err, "cannot make a temporary folder in "));
+}
+
+/* Files of methods: none in it, names that are taken or no names, incomplete tables, code that does not compile. */
+TEST (bad_methods) {
+  static const struct {
+    const char *change, *message;
+  } bad[] = {
+    { "s/\"kutta3\"/\"rk4\"/", "--method-file @/m.c: there is a method rk4 already; call this one otherwise\n" },
+    { "s/\"kutta3\"/\"a+b\"/", "m.c: a method is called \"a+b\": expected letters, digits, _ and -\n" },
+    { "s/\"kutta3\"/\"all\"/", "m.c: a method is called \"all\": expected letters, digits, _ and -, but not all" },
+    { "s/.open = kutta3_open,//", "integrator kutta3: its table needs open, advance, at, restart and close\n" },
+    { "s/{ &kutta3, /{ /", "--method-file @/m.c: there is no method: expected PW_METHOD_FILE (...) at its end\n" },
+    { "/^PW_METHOD_FILE/d", "m.c is not a Pinwheel model: a model file ends with PW_MODEL (...), one of integration " },
+    { "s/^PW_METHOD_FILE/const pw_plugin_table pw_plugin = { .abi = 77 }; void used/",
+      "m.c was compiled for another Pinwheel (ABI 77, this one has " },
+    { "s/kutta3_open (pw_run/kutta3 (pw_run/", "m.c does not compile; the messages of " },
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    char message[300];
+    cli_expand (bad[i].message, message, sizeof message);
+    assert_int_equal (cli_run (check_text ("sed '%s' docs/method.c >@/m.c; pinwheel run pendulum --method-file @/m.c",
+                                           bad[i].change)),
+                      2);
+    if (strstr (cli_err, message) == NULL) print_error ("%s\n%s", bad[i].change, cli_err);
+    assert_non_null (strstr (cli_err, message));
+  }
+  assert_int_equal (cli_run ("pinwheel run docs/method.c"), 2);
+  assert_non_null (strstr (cli_err, "model method contains integration methods, but no build function"));
 }
 
 /* A name that two files could answer is refused with both paths. */

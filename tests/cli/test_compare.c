@@ -102,6 +102,21 @@ TEST (orders) {
   }
 }
 
+/* A method of the user's, by its name; without --methods in addition to the others; its order is 3. */
+TEST (own_method) {
+  cli_good ("pinwheel compare pendulum --method-file docs/method.c --methods kutta3+projection --t-end 2 "
+            "--step-ladder 0.05:0.0125 --repeats 1 --plots @/own");
+  check_close ("order", compare_number ("own/compare.csv", 2, ORDER), 3, 0.2, "steps that are not small");
+  cli_good ("pinwheel compare ezyroller --method-file docs/method.c " SHORT
+            " -o @/own.csv; cut -d, -f1 @/own.csv | uniq");
+  cli_shows ("rk4+projection\n");
+  cli_shows ("kutta3+none\nkutta3+projection\n");
+  cli_good ("pinwheel drift ezyroller --method-file docs/method.c --methods all+projection --t-end 0.1 --only-methods");
+  cli_shows ("kutta3+projection  ");
+  cli_good ("pinwheel run ezyroller --method-file docs/method.c -m kutta3 --t-end 0.1 --json -");
+  assert_true (cli_says (cli_out, "method", "kutta3"));
+}
+
 /* Steps that follow a tolerance are nowhere in an asymptotic range; here two orders of 8 agree. */
 TEST (no_adaptive_order) {
   cli_good (

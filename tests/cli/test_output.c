@@ -303,10 +303,10 @@ TEST (types) {
 #define OUTPUT_ZERO ": it is a character device, not a regular file"
 #define OUTPUT_FOLDER ": it is a directory, not a regular file"
   const cli_wrong each[] = {
-    { "run @/r/p.yaml", "cannot open the model file @/r/p.yaml" OUTPUT_PIPE },
-    { "run @/r/z.yaml", "cannot open the model file @/r/z.yaml" OUTPUT_ZERO },
-    { "run @/r/D", "cannot open the model file @/r/D" OUTPUT_FOLDER },
-    { "run /dev/zero", "cannot open the model file /dev/zero" OUTPUT_ZERO },
+    { "run @/r/p.yaml", "cannot open @/r/p.yaml" OUTPUT_PIPE },
+    { "run @/r/z.yaml", "cannot open @/r/z.yaml" OUTPUT_ZERO },
+    { "run @/r/D", "cannot open @/r/D" OUTPUT_FOLDER },
+    { "run /dev/zero", "cannot open /dev/zero" OUTPUT_ZERO },
     { "run ezyroller -t 1 --reference @/r/pipe", "@/r/pipe: cannot be read" OUTPUT_PIPE },
     { "run ezyroller -t 1 --reference @/r/pipe --checkpoint @/r/c", "cannot read @/r/pipe" OUTPUT_PIPE },
     { "run ezyroller -t 1 --reference /dev/zero", "/dev/zero: cannot be read" OUTPUT_ZERO },

@@ -115,6 +115,9 @@ TEST (other_run) {
   resume_prepare ();
   cli_run ("pinwheel run pendulum --t-end 2 --checkpoint-every 0.5 -o @/b.csv --resume @/b.ck");
   assert_non_null (strstr (cli_err, "b.ck belongs to another run: model is ezyroller, contents "));
+  resume_prepare ();
+  cli_run ("pinwheel " RESUME_SHORT "--method-file docs/method.c --resume @/b.ck");
+  assert_non_null (strstr (cli_err, "b.ck belongs to another run: method-file is method, contents "));
 }
 
 TEST (other_file) {

@@ -95,6 +95,11 @@ TEST (bad_tables) {
   error.status = PW_OK;
   assert_null (pw_model_new ("cart", &table, &error));
   check_error (&error, PW_INPUT, "model cart has no build function: PW_MODEL (...) at its end must set .build");
+  static const struct pw_method *const methods[] = { NULL };
+  table.methods = methods;
+  error.status = PW_OK;
+  assert_null (pw_model_new ("cart", &table, &error));
+  check_error (&error, PW_INPUT, "model cart contains integration methods, but no build function");
 }
 
 TEST (order_of_calls) {

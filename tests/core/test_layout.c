@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "pinwheel-method.h"
 #include "util.h"
 
 #if PW_ABI == 1 && defined __LP64__
@@ -21,7 +22,7 @@ LAYOUT (pw_signal_text, 32);
 LAYOUT (pw_body, 80);
 LAYOUT (pw_parameter, 48);
 LAYOUT (pw_run_defaults, 32);
-LAYOUT (pw_plugin_table, 96);
+LAYOUT (pw_plugin_table, 104);
 LAYOUT (pw_field, 72);
 LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
@@ -30,6 +31,11 @@ LAYOUT (pw_batch, 72);
 LAYOUT (pw_kind, 328);
 LAYOUT (pw_path_place, 88);
 LAYOUT (pw_bounds, 72);
+LAYOUT (pw_method, 104);
+LAYOUT (pw_option, 56);
+LAYOUT (pw_stabilisation, 24);
+LAYOUT (pw_settings, 120);
+LAYOUT (pw_reached, 64);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -61,6 +67,7 @@ LAYOUT_AT (pw_plugin_table, parameters_size, 32);
 LAYOUT_AT (pw_plugin_table, run, 40);
 LAYOUT_AT (pw_plugin_table, build, 80);
 LAYOUT_AT (pw_plugin_table, reference, 88);
+LAYOUT_AT (pw_plugin_table, methods, 96);
 LAYOUT_AT (pw_field, offset, 8);
 LAYOUT_AT (pw_field, type, 16);
 LAYOUT_AT (pw_field, count, 20);
@@ -143,6 +150,34 @@ LAYOUT_AT (pw_bounds, initially_slides, 44);
 LAYOUT_AT (pw_bounds, signal, 48);
 LAYOUT_AT (pw_bounds, relative, 64);
 LAYOUT_AT (pw_bounds, partner, 68);
+LAYOUT_AT (pw_method, about, 8);
+LAYOUT_AT (pw_method, adaptive, 16);
+LAYOUT_AT (pw_method, order, 20);
+LAYOUT_AT (pw_method, stabilisations, 24);
+LAYOUT_AT (pw_method, options, 32);
+LAYOUT_AT (pw_method, refused, 40);
+LAYOUT_AT (pw_method, locates_no_events, 48);
+LAYOUT_AT (pw_method, open, 56);
+LAYOUT_AT (pw_method, advance, 64);
+LAYOUT_AT (pw_method, at, 72);
+LAYOUT_AT (pw_method, restart, 80);
+LAYOUT_AT (pw_method, close, 88);
+LAYOUT_AT (pw_method, serialise, 96);
+LAYOUT_AT (pw_option, with, 8);
+LAYOUT_AT (pw_option, value, 16);
+LAYOUT_AT (pw_option, domain, 24);
+LAYOUT_AT (pw_option, choices, 32);
+LAYOUT_AT (pw_option, unit, 40);
+LAYOUT_AT (pw_option, about, 48);
+LAYOUT_AT (pw_stabilisation, about, 8);
+LAYOUT_AT (pw_stabilisation, kind, 16);
+LAYOUT_AT (pw_reached, settings, 8);
+LAYOUT_AT (pw_reached, t, 16);
+LAYOUT_AT (pw_reached, breakpoint, 24);
+LAYOUT_AT (pw_reached, q, 32);
+LAYOUT_AT (pw_reached, v, 40);
+LAYOUT_AT (pw_reached, a, 48);
+LAYOUT_AT (pw_reached, lambda, 56);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);

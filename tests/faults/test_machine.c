@@ -141,7 +141,7 @@ TEST (interrupted) {
 TEST (no_compiler) {
   cli_good ("pinwheel new @/own.c >@/log");
   assert_int_equal (cli_run ("unset CC; PATH=/none pinwheel run @/own.c"), 2);
-  assert_non_null (strstr (cli_err, "cannot run the C compiler \"cc\" that the model file "));
+  assert_non_null (strstr (cli_err, "cannot run the C compiler \"cc\" that the file "));
 }
 
 /* A parent that ignores SIGCHLD leaves no exit status of the children. */

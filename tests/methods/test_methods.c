@@ -49,7 +49,7 @@ TEST (parse) {
   int stabilisation;
   double value[PW_MAX_OPTIONS];
   pw_error error = { 0 };
-  check_ok (pw_method_parse ("rk4", &m, &stabilisation, &error), &error);
+  check_ok (pw_method_parse ("rk4", NULL, &m, &stabilisation, &error), &error);
   assert_string_equal (m->name, "rk4");
   assert_int_equal (stabilisation, 0);
   check_ok (pw_parse_options ("rk4+baumgarte:alpha=2.5e1:beta=.5", NULL, &m, &stabilisation, value, &error), &error);
@@ -62,7 +62,8 @@ TEST (parse) {
       found++;
     }
   assert_int_equal (found, 3);
-  check_ok (pw_method_parse ("rk4+projection:metric=identity:inputs=held:every=3", &m, &stabilisation, &error), &error);
+  check_ok (pw_method_parse ("rk4+projection:metric=identity:inputs=held:every=3", NULL, &m, &stabilisation, &error),
+            &error);
 }
 
 /* A text that ends in "..." matches longer messages. */
@@ -70,7 +71,7 @@ static void methods_refused (const char *name, const char *text) {
   const pw_method *m;
   int stabilisation;
   pw_error error = { 0 };
-  assert_int_equal (pw_method_parse (name, &m, &stabilisation, &error), PW_INPUT);
+  assert_int_equal (pw_method_parse (name, NULL, &m, &stabilisation, &error), PW_INPUT);
   const char *open = strstr (text, "...");
   if (open == NULL)
     check_error (&error, PW_INPUT, text);

@@ -122,7 +122,7 @@ static void saved_compare (int scene, const char *method) {
   saved_finish (r, s, scene, archive, 0, &whole);
   const pw_method *integrator;
   int stabilisation;
-  check_ok (pw_method_parse (method, &integrator, &stabilisation, &error), &error);
+  check_ok (pw_method_parse (method, NULL, &integrator, &stabilisation, &error), &error);
   if (integrator->serialise == NULL) assert_int_equal (pw_run_statistics (r)->restarts, SAVED_MOMENTS);
   saved_undisturbed (scene, method, integrator, pw_run_statistics (r));
   pw_run_close (r);

@@ -249,7 +249,7 @@ TEST (missing) {
   check_error (&e[5], PW_INPUT, "a sample is missing");
   char text[40] = "x";
   assert_string_equal (pw_run_redundancy (r, pw_run_redundant (r), text, sizeof text), "");
-  assert_int_equal (pw_method_parse ("rk4", NULL, NULL, NULL), PW_OK);
+  assert_int_equal (pw_method_parse ("rk4", NULL, NULL, NULL, NULL), PW_OK);
   pw_run_close (r);
   pw_run_close (runs_open (s, "rk4", &(pw_settings){ .step = 1e308 })); /* 1000 of these, the default span, overflow */
   assert_int_equal (pw_system_find_held (NULL, "frame.x", &e[6]), PW_INPUT);

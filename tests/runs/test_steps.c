@@ -19,7 +19,7 @@ static const char *steps_method (int i, char name[STEPS_NAME]) {
         snprintf (name, STEPS_NAME, "%s+%s%s", pw_methods[m]->name, x->name, held ? ":inputs=held" : "");
         const pw_method *method;
         int number;
-        if ((!held || pw_method_parse (name, &method, &number, NULL) == PW_OK) && i-- == 0) return name;
+        if ((!held || pw_method_parse (name, NULL, &method, &number, NULL) == PW_OK) && i-- == 0) return name;
       }
   return NULL;
 }

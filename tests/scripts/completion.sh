@@ -20,6 +20,8 @@ complete pinwheel co; expect 'a command' compare
 complete pinwheel run ez; expect 'a model' ezyroller
 complete pinwheel run ezyroller --method erk8+; expect 'a method' 'erk8.none erk8.projection erk8.nullspace'
 complete pinwheel run ezyroller --ch; expect 'an option' '--checkpoint --checkpoint-every'
+complete pinwheel compare ezyroller --method-f; expect 'an option of a file' '--method-file'
+complete pinwheel compare ezyroller --method-file docs/meth; expect 'its file' docs/method.c
 complete pinwheel list k; expect 'a list' kinds
 complete pinwheel run ezyroller -o READ; expect 'a file' README.md
 exit $bad

@@ -74,7 +74,7 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   d.rtol = 1e-12;
   int status = pw_cli_settings (&cmd->line, &d, &settings, &cmd->limit, error);
   cmd->settings.method = cmd->line.method ? cmd->line.method : "erk8+projection";
-  cmd->settings.rtol = settings.rtol;
+  cmd->settings.rtol = settings.rtol, cmd->settings.methods = settings.methods;
   cmd->vary.name = cmd->vary.unit = "";
   cmd->settings.stop = pw_limit_over, cmd->settings.stop_context = &cmd->limit;
   if (status == PW_OK) status = periodic_read_period (cmd, error);
@@ -384,7 +384,9 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
 /* Stores x, y, phi, omega of the bodies drawn at PERIODIC_SAMPLES + 1 times of one period, one row for each. */
 static int periodic_sample (const pw_periodic_command *cmd, int bodies, double *row, pw_error *error) {
   const pw_periodic_orbit *o = &cmd->point->orbit;
-  const pw_settings settings = { .span = o->period, .rtol = 1e-9 }; /* finer than lines in a figure */
+  const pw_settings settings = { .span = o->period,
+                                 .rtol = 1e-9,
+                                 .methods = cmd->line.methods }; /* finer than lines in a figure */
   int status;
   pw_run *r = pw_run_open (cmd->line.m.system, cmd->settings.method, &settings, error);
   if (r == NULL) return error->status;
@@ -546,6 +548,7 @@ static const struct poptOption periodic_options_table[] = {
   PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=LOW:HIGH", "Follow the motion over a parameter"),
   PW_RESULTS_OPTIONS ("Write the motion or branch as a table", "Write the results", "Draw a figure"),
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
+  PW_METHOD_FILE_OPTION,
   PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
   PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,

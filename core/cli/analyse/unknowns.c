@@ -35,7 +35,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error) 
   int stabilisation;
   pw_limit limit;
   *u = (pw_unknowns){ .line = line, .method = line->method ? line->method : line->m.defaults.method };
-  int status = pw_method_parse (u->method, &method, &stabilisation, error);
+  int status = pw_method_parse (u->method, line->methods, &method, &stabilisation, error);
   if (status == PW_OK) status = pw_cli_settings (line, &line->m.defaults, &u->settings, &limit, error);
   if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
@@ -226,7 +226,7 @@ int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *v
 }
 
 double pw_unknowns_noise (const pw_unknowns *u) {
-  return pw_cli_adaptive (u->method) == 1 ? u->settings.rtol : DBL_EPSILON;
+  return pw_cli_adaptive (u->line->methods, u->method) == 1 ? u->settings.rtol : DBL_EPSILON;
 }
 
 /* ---- Starts and results of searches ---- */

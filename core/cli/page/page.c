@@ -92,7 +92,7 @@ static int page_choose_method (page *cmd, pw_error *error) {
   const pw_method *m;
   int stabilisation;
   const char *wanted = cmd->line.method ? cmd->line.method : cmd->line.m.defaults.method;
-  if (pw_method_parse (wanted, &m, &stabilisation, error) != PW_OK) return error->status;
+  if (pw_method_parse (wanted, NULL, &m, &stabilisation, error) != PW_OK) return error->status;
   int available = page_has_method (m);
   if (!available && cmd->line.method) return pw_fail (error, PW_INPUT, "--method %s: pages have " PAGE_METHODS, wanted);
   int options = strchr (wanted, ':') != NULL;
@@ -116,7 +116,7 @@ static int page_check_word (const page *cmd, char *word, pw_error *error) {
   if (value == NULL) return pw_fail (error, PW_INPUT, "%s: expected NAME=VALUE", word);
   *value++ = 0;
   if (strcmp (word, "method") == 0) {
-    if (pw_method_parse (value, &m, &stabilisation, error) != PW_OK) return error->status;
+    if (pw_method_parse (value, NULL, &m, &stabilisation, error) != PW_OK) return error->status;
     if (page_has_method (m) && strchr (value, ':') == NULL) return PW_OK;
     return pw_fail (error, PW_INPUT, "method=%s: pages have " PAGE_METHODS ", without options", value);
   }

@@ -584,7 +584,7 @@ enum { COMPARE_GROUP = 0, COMPARE_POINTS = 1 };
 /* Adds a row for each level of each method. */
 static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], pw_error *error) {
   for (int i = 0; i < study->methods; i++) {
-    int adaptive = pw_cli_adaptive (study->method[i]);
+    int adaptive = pw_cli_adaptive (study->line.methods, study->method[i]);
     double level;
     for (int k = 0; (level = compare_level (ladders[adaptive], adaptive, k)) > 0; k++) {
       pw_row *row = pw_study_add (study, COMPARE_GROUP, i, study->method[i], COMPARE_POINTS, error);

@@ -90,7 +90,7 @@ static void drift_method (char method[STUDY_NAME], const pw_study *study, int op
   char hint[PW_HINT];
   snprintf (method, STUDY_NAME, "rk4+%s", stabilisation);
   for (int i = 0; i < study->methods; i++) {
-    if (pw_method_parse (study->method[i], &integrator, NULL, NULL) != PW_OK ||
+    if (pw_method_parse (study->method[i], study->line.methods, &integrator, NULL, NULL) != PW_OK ||
         pw_find_name (integrator->options, sizeof *integrator->options, drift_option[option], hint) < 0)
       continue;
     snprintf (method, STUDY_NAME, "%s+%s", integrator->name, stabilisation);

@@ -27,7 +27,7 @@ void pw_report_settings (pw_run *run, const pw_system *system, const char *metho
   double step = fmin (settings->step, settings->span), time_scale = pw_run_scale (run)->time;
   pw_cli_report_unused (method, line);
   pw_cli_report_tables (system, settings->span);
-  const int adaptive = pw_cli_adaptive (method) == 1;
+  const int adaptive = pw_cli_adaptive (line->methods, method) == 1;
   char element[PW_NAME_BYTES];
   double saturation;
   int state = adaptive && settings->atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
@@ -239,7 +239,7 @@ static void report_events (const pw_system *system, const pw_summary *summary) {
   const int first = summary->events > REPORT_EVENTS ? summary->events - REPORT_EVENTS : 0;
   const pw_method *method;
   if (pw_system_limited (system) == 0) return;
-  if (pw_method_parse (summary->method, &method, NULL, NULL) == PW_OK && method->locates_no_events) {
+  if (pw_method_parse (summary->method, NULL, &method, NULL, NULL) == PW_OK && method->locates_no_events) {
     pw_cli_print (stdout, "  %s locates no events: reactions with limits are means over steps\n", method->name);
     return;
   }

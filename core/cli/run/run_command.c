@@ -52,8 +52,8 @@ static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   const unsigned short order = 1;
   pw_text *text = &command->checkpoints.fingerprint;
   const pw_model *model = command->line.m.model;
-  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->line.m.file, pw_fingerprint_tables (0, model),
-                          command->method, &command->settings, error) != PW_OK)
+  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, &command->line, pw_fingerprint_tables (0, model), command->method,
+                          &command->settings, error) != PW_OK)
     return error->status;
   if (command->engine.code) pw_fingerprint_line (text, checkpoints_engine_key, NULL, "specialised");
   for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++)
@@ -230,7 +230,6 @@ static void run_discard (pw_run_cli *command, int which) {
 static int run_read_settings (pw_run_cli *command, pw_error *error) {
   const pw_run_defaults *defaults = &command->line.m.defaults;
   const pw_method *method;
-  int stabilisation;
   pw_specialise when;
   pw_error reason = { 0 };
   int status = pw_cli_settings (&command->line, defaults, &command->settings, &command->limit, error);
@@ -238,7 +237,7 @@ static int run_read_settings (pw_run_cli *command, pw_error *error) {
     status = pw_cli_number ("--every", command->row_interval_text, PW_POSITIVE, &command->row_interval, error);
   command->method = command->line.method ? command->line.method : defaults->method;
   if (status == PW_OK && command->line.method == NULL &&
-      pw_method_parse (command->method, &method, &stabilisation, &reason) != PW_OK)
+      pw_method_parse (command->method, command->line.methods, &method, NULL, &reason) != PW_OK)
     return pw_fail (error, reason.status, "model %s: its default method: %s", pw_file_name (command->line.m.file),
                     reason.text);
   command->settings.ledger = command->with_energies || command->plots_path || command->page_path;
@@ -429,7 +428,7 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
     status = stated;
   }
   const pw_statistics *statistics = pw_run_statistics (command->run);
-  int too_many_steps = status == PW_METHOD && pw_cli_adaptive (command->method) == 1 &&
+  int too_many_steps = status == PW_METHOD && pw_cli_adaptive (command->line.methods, command->method) == 1 &&
                        statistics->steps + statistics->rejected >= command->settings.max_steps;
   command->limited = status == PW_STOPPED || too_many_steps;
   if (status == PW_STOPPED) status = pw_limit_status (&command->limit, pw_run_time (command->run), error);

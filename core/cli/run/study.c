@@ -9,7 +9,7 @@
 
 static int methods_add (pw_study *study, const char *name, pw_error *error) {
   const pw_method *integrator;
-  int stabilisation, status = pw_method_parse (name, &integrator, &stabilisation, error);
+  int stabilisation, status = pw_method_parse (name, study->line.methods, &integrator, &stabilisation, error);
   if (status != PW_OK) return status;
   for (int i = 0; i < study->methods; i++)
     if (strcmp (study->method[i], name) == 0) return PW_OK;
@@ -20,32 +20,44 @@ static int methods_add (pw_study *study, const char *name, pw_error *error) {
   return PW_OK;
 }
 
+/* Adds each stabilisation of an integrator, or this one; 1 if it has it. */
+static int methods_add_stabilisations (pw_study *study, const pw_method *integrator, pw_nearest *stabilisation,
+                                       pw_error *error) {
+  int found = 0;
+  for (const pw_stabilisation *s = integrator->stabilisations; error->status == PW_OK && s->name; s++) {
+    if (stabilisation->sought) pw_nearest_try (stabilisation, s->name);
+    if (stabilisation->sought && strcmp (stabilisation->sought, s->name) != 0) continue;
+    methods_add (study, PW_PRINTED (STUDY_NAME, "%s+%s", integrator->name, s->name), error);
+    found = 1;
+  }
+  return found;
+}
+
 /* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
 static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
   char *tail = pattern + strcspn (pattern, "+:");
   int any_integrator = strncmp (pattern, "all+", 4) == 0 || strcmp (pattern, "all") == 0;
-  const char *stabilisation = any_integrator && *tail && strcmp (tail, "+all") != 0 ? tail + 1 : NULL; /* NULL: all */
-  const pw_method *integrator = NULL;                                                                  /* NULL: all */
-  pw_nearest near = { .sought = stabilisation };
-  int index, status = PW_OK, found = 0;
+  const pw_method *const *const list[] = { pw_methods, study->line.methods };
+  const pw_method *integrator;
+  pw_nearest near = { .sought = any_integrator && *tail && strcmp (tail, "+all") != 0 ? tail + 1 : NULL }; /* or all */
+  int found = 0;
   if (!any_integrator && strcmp (tail, "+all") != 0) return methods_add (study, pattern, error);
   *tail = 0;
-  if (!any_integrator) status = pw_method_parse (pattern, &integrator, &index, error);
-  for (int i = 0; pw_methods[i]; i++)
-    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
-      if (integrator && integrator != pw_methods[i]) continue;
-      if (stabilisation) pw_nearest_try (&near, s->name);
-      if (stabilisation && strcmp (stabilisation, s->name) != 0) continue;
-      status = methods_add (study, PW_PRINTED (STUDY_NAME, "%s+%s", pw_methods[i]->name, s->name), error);
-      found = 1;
-    }
-  if (status != PW_OK || found) return status;
-  return pw_fail (error, PW_INPUT, "--methods all+%.60s: no integrator has this stabilisation%s", stabilisation,
+  if (!any_integrator) {
+    if (pw_method_parse (pattern, study->line.methods, &integrator, NULL, error) == PW_OK)
+      methods_add_stabilisations (study, integrator, &near, error);
+    return error->status;
+  }
+  for (int l = 0; l < 2; l++)
+    for (const pw_method *const *m = list[l]; m && *m; m++)
+      found |= methods_add_stabilisations (study, *m, &near, error);
+  if (error->status != PW_OK || found) return error->status;
+  return pw_fail (error, PW_INPUT, "--methods all+%.60s: no integrator has this stabilisation%s", near.sought,
                   pw_nearest_text (&near));
 }
 
-int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error) {
-  const char *text = study->methods_text ? study->methods_text : otherwise;
+/* Adds the methods of a list of patterns, separated by commas. */
+static int methods_add_list (pw_study *study, const char *text, pw_error *error) {
   for (const char *rest = text;; rest++) {
     char pattern[STUDY_NAME];
     size_t n = strcspn (rest, ",");
@@ -56,6 +68,13 @@ int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *err
     rest += n;
     if (status != PW_OK || *rest == 0) return status;
   }
+}
+
+int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error) {
+  int status = methods_add_list (study, study->methods_text ? study->methods_text : otherwise, error);
+  for (const pw_method *const *m = study->line.methods; m && *m && study->methods_text == NULL && status == PW_OK; m++)
+    status = methods_add_list (study, PW_PRINTED (STUDY_NAME, "%s+all", (*m)->name), error);
+  return status;
 }
 
 /* ---- Rows ---- */
@@ -121,6 +140,7 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   if (visitor == NULL) limit.seconds = INFINITY; /* timed: not slowed down by readings of the clock in every step */
   row->cpu = 0;
   pw_limit_start (&limit);
+  run_settings.methods = study->line.methods;
   run_settings.stop = pw_limit_over;
   run_settings.stop_context = &limit;
   run_settings.specialised = pw_scene_code_table (study->engine.code);
@@ -246,7 +266,7 @@ void pw_study_add_curves (const pw_study *study, int group, pw_curves *c, int x,
   int stabilisation;
   for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
     if (row->curve != curve) {
-      int known = pw_method_parse (row->label, &integrator, &stabilisation, NULL) == PW_OK;
+      int known = pw_method_parse (row->label, study->line.methods, &integrator, &stabilisation, NULL) == PW_OK;
       const char *name = known ? integrator->stabilisations[stabilisation].name : "";
       pw_curves_add (c, PW_PRINTED (60, "method %s", name), row->label);
     }

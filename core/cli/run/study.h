@@ -59,7 +59,8 @@ const char *pw_study_status (const pw_row *row); /* "ok", "failed", ... */
 #define PW_STUDY_METHODS_OPTION(defaults)                                                                              \
   PW_TEXT_OPTION (pw_study, methods_text, "methods", 'm', "A,B,...|all",                                               \
                   "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with " \
-                  "ggl; all: every method (" defaults ")")
+                  "ggl; all: every method (" defaults ", and those of --method-file)"),                                \
+      PW_METHOD_FILE_OPTION
 
 /* What a command provides.  Functions return a status. */
 typedef struct {
@@ -117,9 +118,9 @@ struct pw_study {
 /* Runs a command whose options begin with a pw_study. */
 int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error);
 
-/* Reads --methods, or `otherwise` if it is not given: names separated by commas; "all" stands for each integrator with
- * each stabilisation, "rk4+all" for rk4 with each, "all+ggl" for each integrator that has ggl.  A method named twice is
- * used once.  PW_INPUT with the nearest valid name. */
+/* Reads --methods or, if it is not given, `otherwise` and all methods of --method-file: names separated by commas;
+ * "all" stands for each integrator with each stabilisation, "rk4+all" for rk4 with each, "all+ggl" for each integrator
+ * that has ggl.  A method named twice is used once.  PW_INPUT with the nearest valid name. */
 int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error);
 
 /* Adds a row whose values and points are NaN; rows of a curve follow each other.  The pointer is valid until the next

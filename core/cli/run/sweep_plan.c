@@ -316,8 +316,8 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
 
 static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
   pw_text *text = &plan->fingerprint;
-  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line->m.file, plan->tables_sum, plan->method, &plan->settings,
-                          error) != PW_OK)
+  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line, plan->tables_sum, plan->method, &plan->settings, error) !=
+      PW_OK)
     return error->status;
   if (plan->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
@@ -351,7 +351,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
 
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   const pw_method *method;
-  int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
+  int stabilisation, status = pw_method_parse (plan->method, plan->line->methods, &method, &stabilisation, error);
   if (status == PW_OK) status = grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
   if (status != PW_OK) return status;
   pw_model *model = pw_file_model (plan->line->m.file, error);

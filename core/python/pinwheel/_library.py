@@ -241,7 +241,7 @@ _declare(core, _i, ("pw_run_find_crossing", _p, c.POINTER(pw_crossing), _double_
 _declare(files, _p, ("pw_condition_open", _p, _s, _e))
 _declare(files, _i, ("pw_condition_needs_ledger", _p))
 _declare(files, None, ("pw_condition_close", _p))
-_declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_adaptive", _p, _s),
+_declare(core, _i, ("pw_method_parse", _s, _p, c.POINTER(_p), _p, _e), ("pw_method_adaptive", _p, _s),
          ("pw_system_contacts", _p), ("pw_system_outputs", _p))
 _declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))

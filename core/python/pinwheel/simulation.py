@@ -104,7 +104,7 @@ def specialised(when: str, steps: float) -> bool:
 def adaptive(method: str) -> bool | None:
     """Whether a method chooses its steps; None for an unknown one."""
     integrator = c.c_void_p()
-    if lib.core.pw_method_parse(lib.encode(method, "method"), c.byref(integrator), None, None) != lib.PW_OK:
+    if lib.core.pw_method_parse(lib.encode(method, "method"), None, c.byref(integrator), None, None) != lib.PW_OK:
         return None
     return bool(lib.core.pw_method_adaptive(integrator, method.encode()))
 
