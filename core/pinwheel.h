@@ -795,7 +795,7 @@ struct pw_kind {
   pw_batch_function *saturation;
   /* Strokes in figures, separated by ";" (core/cli/plot/plot_shapes.c); NULL: none.  Vertex "a x y": at the fraction a
    * of the way from the first body's point to the last body's, plus x along and y to the left of the heading, in units
-   * of symbols.  "o a x y r": a circle of radius r.  "g1", "g2": the pitch circles of two gears. */
+   * of symbols.  "o a x y r": a circle of radius r.  "d n NAME": the disc of body n with the radius in field NAME. */
   const char *symbol;
   /* Sets the limits of an element's multipliers (rows), -INFINITY to INFINITY before the call; NULL: they stay so. */
   void (*limits) (const void *definition, pw_bounds *limit);

@@ -86,6 +86,28 @@ TEST (joint) {
   free (page);
 }
 
+/* A contact and its friction are one element: one force, one entry of the legend; without lines to the centres. */
+TEST (contacts) {
+  cli_write ("ball.yaml",
+             "pinwheel: 1\nbodies: [{name: ball, mass: 1, inertia: 0.01, start: {y: 0.2}, rate: {vx: 9}}]\n"
+             "elements:\n  - {gravity: g, acceleration: [0, -10]}\n"
+             "  - {contact: C, body: [ball, ground], at: [[0, 0], [0, 0]], radius: 0.1, mu: 0.5}\n"
+             "  - {contact: D, body: [ball, ground], at: [[0, 0], [0, -9]], radius: 0.1, other_radius: 9}\n");
+  cli_good ("pinwheel run @/ball.yaml -t 0.2 --animate @/ball.html");
+  char *page = animate_page ("ball.html");
+  assert_non_null (strstr (page, "\"discs\": [\n    {\"body\": 0, \"at\": [0, 0], \"radius\": 0.1},\n"
+                                 "    {\"body\": -1, \"at\": [0, -9], \"radius\": 9}\n"));
+  const char *name = strstr (animate_array (page, "events"), "\"contact C\""), *stop = strstr (page, "\"outputs\"");
+  assert_true (name && name < stop && strstr (name + 1, "\"contact C\"") == NULL);
+  double force[4];
+  const char *row = strchr (animate_array (page, "force"), ']') - 1;
+  while (*--row != '\n') {}
+  assert_int_equal (sscanf (row, "%lf, %lf, %lf, %lf", &force[0], &force[1], &force[2], &force[3]), 4);
+  check_close ("friction of C", force[0], -5, 1e-5, "mu m g, six digits");
+  check_close ("normal force of C", force[1], 10, 1e-5, "the same");
+  free (page);
+}
+
 TEST (names) {
   cli_good ("cp tests/models/arm.yaml '@/a<b>&.yaml'");
   cli_good (

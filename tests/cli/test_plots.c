@@ -362,6 +362,41 @@ TEST (symbols) {
   assert_true (2 * length[1] < length[0]); /* a rail that moves has no hatching */
 }
 
+/* The number of lines "x y t body" of data, up to the next "#", on a circle. */
+static int plots_circle (const char *data, double x0, double y0, double radius, int body) {
+  int n = 0;
+  for (const char *stop = strchr (data + 1, '#'); (data = strchr (data, '\n')) != NULL && (!stop || data < stop);) {
+    double x, y, t;
+    int b;
+    if (*++data == '\n' || sscanf (data, "%lf %lf %lf %d", &x, &y, &t, &b) != 4 || b != body) continue;
+    n += fabs (hypot (x - x0, y - y0) - radius) < 1e-8 * radius;
+  }
+  return n;
+}
+
+/* Discs of contacts on a body and on the ground, each once; a line with hatching on its right; the walls of a stop. */
+TEST (contacts) {
+  const char *contacts = "  - {contact: S, body: [a, ground], at: [[0, 0], [0, -0.3]], radius: 0.3, mu: 0.5}\n"
+                         "  - {contact: D, body: [a, ground], at: [[0, 0], [3, 0]], radius: 0.3, other_radius: 0.7}\n"
+                         "  - {contact: P, body: [c, b], at: [[0, 0], [0, -2]]}\n"
+                         "  - {stop: X, body: [c, ground], what: x, low: 0, high: 9}\n";
+  const char *data = plots_symbols (contacts);
+  int below = 0, walls = 0;
+  assert_int_equal (plots_circle (strstr (cli_file ("symbols/mechanism.dat"), "# bodies, at the end"), 0, 0, 0.3, 1),
+                    97);
+  assert_int_equal (plots_circle (strstr (cli_file ("symbols/mechanism.dat"), "# bodies, at the end"), 3, 0, 0.7, 0),
+                    97);
+  data = plots_symbols (contacts);
+  for (; (data = strchr (data, '\n')) != NULL;) {
+    double x[2], y[2];
+    if (*++data == '\n' || sscanf (data, "%lf %lf 1 0\n%lf %lf 1 0\n", &x[0], &y[0], &x[1], &y[1]) != 4) continue;
+    if (fabs (y[0] + 0.3) < 1e-9) below += y[1] < y[0] && x[1] < x[0];
+    walls += x[0] == x[1] && y[0] == -y[1] && (x[0] == 0 || x[0] == 9);
+  }
+  assert_in_range (below, 5, 60);
+  assert_int_equal (walls, 2);
+}
+
 TEST (style) {
   assert_int_equal (
       cli_run ("PATH=/none pinwheel run ezyroller -t 1 --plots @/style --width 8.5cm --colour time >/dev/null"), 0);

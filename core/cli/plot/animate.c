@@ -32,6 +32,13 @@ void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   }
   pw_json_close (j, ']');
   page_points (j, "ground", *plots->ground, plots->grounds, NULL);
+  pw_json_open (j, "discs", '[');
+  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
+    pw_json_print (j, "{body: %d", disc->body);
+    pw_json_numbers (j, "at", disc->at, 2);
+    pw_json_print (j, ", radius: %g}", disc->at[2]);
+  }
+  pw_json_close (j, ']');
   pw_json_open (j, "wheels", '[');
   for (int w = 0; w < plots->wheels.drawn; w++)
     pw_json_print (j, "{name: %s, body: %d, rolls: %i}", pw_plot_name (plots, &plots->wheels, w),
@@ -46,8 +53,8 @@ void pw_animation_scene (pw_json *j, const pw_plots *plots) {
       pw_json_numbers (j, "at", link->end[n].at, 2);
       pw_json_close (j, '}');
     }
-    pw_json_print (j, "], wheel: %d, line: %i, heading: %g, strokes: [", link->wheel, link->rail,
-                   pw_plot_heading (link));
+    pw_json_print (j, "], wheel: %d, line: %i, plain: %i, heading: %g, strokes: [", link->wheel, link->rail,
+                   link->kind->symbol == NULL, pw_plot_heading (link));
     /* each stroke of the symbol: 1 if it is closed + 2 if it is upright, then its vertices */
     pw_plot_stroke stroke[PLOT_STROKES];
     int strokes = pw_plot_strokes (plots, link, plots->samples, stroke);

@@ -94,6 +94,18 @@ typedef struct {
   double corner[PLOT_ATTACHMENTS + 1][2];
 } pw_plot_body;
 
+/* A disc of a body, drawn or the ground: x, y of its centre in the body's frame, radius [m]. */
+typedef struct {
+  int body;
+  double at[3];
+} pw_plot_disc;
+
+/* An end of a link. */
+typedef struct {
+  int body;     /* among those drawn, or PLOT_GROUND */
+  double at[2]; /* in its frame [m] */
+} pw_plot_end_of;
+
 /* An element that is drawn, between points of its bodies, or without such points at the joints of its bodies with each
  * other. */
 typedef struct {
@@ -101,14 +113,12 @@ typedef struct {
   const pw_kind *kind;
   const void *definition;
   int wheel; /* its index among the wheels drawn; -1: none */
-  int rail;  /* 1 if the symbol contains a rail or slot, a line of the last body */
+  int rail;  /* 1 if the symbol contains a rail, a line of the last body, or a length in its frame */
   int ends;  /* 1 or 2 */
-  struct {
-    int body;     /* among those drawn, or PLOT_GROUND */
-    double at[2]; /* in its frame [m] */
-  } end[2];
-  int force_end;    /* the end at which its force is drawn, on a body; -1: its force is not drawn */
-  int force_offset; /* of that force in the result of pw_workspace_forces */
+  pw_plot_end_of end[2];
+  int force_end;        /* the end at which its force is drawn, on a body; -1: its force is not drawn */
+  int force_offset;     /* of that force in the result of pw_workspace_forces */
+  int companion_offset; /* of that of its companion, which is added to it; -1: it has none */
 } pw_plot_link;
 
 /* A stroke of a symbol, a polygonal line.  A vertex a, x, y, b is the point  p1 + a d + b d' + u (x e + y n), where p1
@@ -150,6 +160,8 @@ struct pw_plots {
   int *body_index;      /* of each body: its index among those drawn or PLOT_HIDDEN; PLOT_GROUND at the end */
   pw_plot_body *shape;  /* of the bodies drawn */
   double (*ground)[2];  /* grounds [m] */
+  int discs;            /* of bodies and the ground */
+  pw_plot_disc *disc;   /* discs */
   double *data;         /* planned x sample_size: the samples */
   double (*contact)[3]; /* scratch: of the wheels of the system */
   pw_plot_link *link;   /* links */
@@ -179,6 +191,8 @@ const char *pw_plot_name (const pw_plots *plots, const pw_tracks *tracks, int k)
 /* 1 for a wheel, 0 for a marker, of those drawn. */
 int pw_plot_rolls (const pw_plots *plots, int wheel);
 
+/* The link of the element that a companion accompanies; NULL if it is not drawn, or this is no companion. */
+pw_plot_link *pw_plot_accompanied (const pw_plots *plots, const pw_element_info *companion);
 /* Fills shape, ground and link, as far as they have room. */
 void pw_plot_find_shapes (pw_plots *plots);
 /* 1 if attachment point k is not a corner of the hull. */
@@ -196,6 +210,8 @@ double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i);
 void pw_plot_measure (pw_plots *plots);
 /* A point of a body in the inertial frame [m]; placement: x, y, phi of the body; at: the point in its frame. */
 void pw_plot_point (const double *placement, const double *at, double out[2]);
+/* x, y and angle of a disc at sample i, in the inertial frame [m], [rad]. */
+void pw_plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *disc, double out[3]);
 /* End n of a link at sample i, in the inertial frame [m]. */
 void pw_plot_end (const pw_plots *plots, int i, const pw_plot_link *link, int n, double out[2]);
 

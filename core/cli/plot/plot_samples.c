@@ -55,6 +55,7 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   plots->body_index = plot_array (plots, bodies->count + 1, sizeof *plots->body_index);
   plots->shape = plot_array (plots, bodies->drawn, sizeof *plots->shape);
   plots->ground = plot_array (plots, PLOT_DRAWN, sizeof *plots->ground);
+  plots->disc = plot_array (plots, PLOT_DRAWN, sizeof *plots->disc);
   plots->data = plot_array (plots, plots->planned, (size_t)plots->sample_size * sizeof *plots->data);
   plots->contact = plot_array (plots, wheels->count, sizeof *plots->contact);
   plots->paths = pw_model_reference_text (plots->model)->paths;
@@ -173,11 +174,19 @@ void pw_plots_last (pw_plots *plots, const pw_sample *sample) {
   plots->planned = plots->samples;
 }
 
+/* The constraint equation `row` or, of a companion, one of the element that it accompanies. */
+static int plot_row_of (const pw_plots *plots, int row) {
+  const pw_element_info own = pw_system_element (plots->system, pw_system_row_element (plots->system, row));
+  const pw_plot_link *link = pw_plot_accompanied (plots, &own);
+  return link ? pw_system_element (plots->system, link->element).row : row;
+}
+
 void pw_plots_events (pw_plots *plots, const pw_run *run) {
   const pw_event *event = pw_run_events (run, &plots->events);
   plots->event = pw_arena_alloc (&plots->arena, (size_t)plots->events * sizeof *plots->event);
   if (plots->event == NULL) plots->events = 0;
-  if (plots->events) memcpy (plots->event, event, (size_t)plots->events * sizeof *event);
+  for (int i = 0; i < plots->events; i++)
+    plots->event[i] = event[i], plots->event[i].row = plot_row_of (plots, event[i].row);
 }
 
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
@@ -197,7 +206,8 @@ enum {
   FIGURES_COLOURS = 8,    /* of bodies */
   FIGURES_SNAPSHOTS = 60, /* at most, before their stride is rounded down */
   FIGURES_FEWEST = 8,     /* snapshots, at least */
-  FIGURES_CLOSEUP = 12    /* samples of a close-up, at least */
+  FIGURES_CLOSEUP = 12,   /* samples of a close-up, at least */
+  FIGURES_SIDES = 96      /* of the polygon of a disc */
 };
 #define FIGURES_FAR 10    /* extent of a motion with a close-up, at least, in sizes of the mechanism (pw_plots.size) */
 #define FIGURES_NEAR 4    /* extent of the close-up, at most, in sizes of the mechanism */
@@ -263,10 +273,27 @@ static void data_segment (FILE *f, const double *from, const double *to, double 
   data_vertex (f, to, t, body, "\n\n");
 }
 
-/* Bodies of sample i: their outlines, and lines from the centre of mass to the attachment points inside, all of them if
- * there is no outline. */
+/* Discs of sample i: polygons, those of bodies with a line from the centre, which shows that they turn. */
+static void data_discs (FILE *f, const pw_plots *plots, int i) {
+  double t = pw_plot_sample (plots, i)[PLOT_T], at[3], point[2];
+  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
+    pw_plot_disc_centre (plots, i, disc, at);
+    if (disc->body >= 0) data_vertex (f, at, t, disc->body, "\n");
+    for (int k = 0; k <= FIGURES_SIDES; k++) {
+      pw_plot_point (at,
+                     (const double[]){ disc->at[2] * cos (k * 2 * PW_PI / FIGURES_SIDES),
+                                       disc->at[2] * sin (k * 2 * PW_PI / FIGURES_SIDES) },
+                     point);
+      data_vertex (f, point, t, disc->body, k < FIGURES_SIDES ? "\n" : "\n\n");
+    }
+  }
+}
+
+/* Bodies of sample i: their discs, their outlines, and lines from the centre of mass to the attachment points inside,
+ * all of them if there is no outline. */
 static void data_bodies (FILE *f, const pw_plots *plots, int i) {
   double t = pw_plot_sample (plots, i)[PLOT_T], point[2];
+  data_discs (f, plots, i);
   for (int b = 0; b < plots->bodies.drawn; b++) {
     const pw_plot_body *shape = &plots->shape[b];
     const double *motion = pw_plot_track (plots, i, &plots->bodies, b);
@@ -401,13 +428,15 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   fputs ("'\n", f);
   fprintf (f, "ground = %d\nby_time = %d\nmodel_paths = %d\n", plots->grounds > 0, plots->by_time, plots->paths);
   if (!mechanism) return pw_figure_end (o, name, error);
-  /* the names of bodies unless there are too many, and the colours of those with an area */
-  int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS] = { 0 };
+  /* the names of bodies unless there are too many, and the colours of those with an area, 0: of the ground */
+  int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS + 1] = { 0 };
   fprintf (f, "bodies = %d\narray body[%d]\n", named, bodies);
-  for (int b = 0; b < bodies; b++) area[b % FIGURES_COLOURS] |= plots->shape[b].corners > 0;
+  for (int b = 0; b < bodies; b++) area[b % FIGURES_COLOURS + 1] |= plots->shape[b].corners > 0;
+  for (int d = 0; d < plots->discs; d++)
+    area[plots->disc[d].body < 0 ? 0 : plots->disc[d].body % FIGURES_COLOURS + 1] = 1;
   fputs ("areas = '", f);
-  for (int c = 0; c < FIGURES_COLOURS; c++)
-    if (area[c]) fprintf (f, "%d ", c + 1);
+  for (int c = 0; c <= FIGURES_COLOURS; c++)
+    if (area[c]) fprintf (f, "%d ", c);
   fputs ("'\n", f);
   for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (plots, &plots->bodies, b));
   return pw_figure_end (o, name, error);

@@ -61,6 +61,31 @@ static void shapes_add_points (pw_plots *plots, const pw_element *e, const int *
   }
 }
 
+/* The value of a number or a choice of an element; 0 if it has no such field. */
+static double shapes_field (const pw_kind *kind, const void *definition, const char *name, size_t length) {
+  const pw_field *f = kind->fields;
+  while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
+  if (f->name == NULL) return 0;
+  const void *at = (const char *)definition + f->offset;
+  return f->type == PW_NUMBER ? *(const double *)at : f->type == PW_CHOICE ? *(const int *)at : 0;
+}
+
+/* The discs of an element, each once. */
+static void shapes_add_discs (pw_plots *plots, const pw_element *e, const int *bodies) {
+  char field[32];
+  int n;
+  for (const char *text = e->kind->symbol; text; text = strchr (text, ';')) {
+    if (sscanf (text += *text == ';', " d %d %31[a-z_]", &n, field) != 2 || plots->discs == PLOT_DRAWN) continue;
+    const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+    const pw_plot_disc disc = { plots->body_index[bodies[n]],
+                                { at[0], at[1], shapes_field (e->kind, e->definition, field, strlen (field)) } };
+    int known = disc.body == PLOT_HIDDEN || disc.at[2] == 0;
+    for (const pw_plot_disc *d = plots->disc; d < plots->disc + plots->discs; d++)
+      known |= d->body == disc.body && memcmp (d->at, disc.at, sizeof disc.at) == 0;
+    if (!known) plots->disc[plots->discs++] = disc;
+  }
+}
+
 /* ---- Links ---- */
 
 /* Adds an end at the joint of two bodies, the first one's end of an earlier link between them; 0 if there is none. */
@@ -98,8 +123,9 @@ static int shapes_link (const pw_plots *plots, const pw_element *e, int element,
   *link = (pw_plot_link){ .element = element,
                           .kind = e->kind,
                           .definition = e->definition,
-                          .rail = e->kind->symbol && strstr (e->kind->symbol, "inf"),
+                          .rail = e->kind->symbol && (strstr (e->kind->symbol, "inf") || strchr (e->kind->symbol, '@')),
                           .force_end = -1,
+                          .companion_offset = -1,
                           .wheel = plots->wheels.drawn - 1 };
   while (link->wheel >= 0 && plots->wheels.system_index[link->wheel] != element) link->wheel--;
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
@@ -121,7 +147,15 @@ static int shapes_link (const pw_plots *plots, const pw_element *e, int element,
   return link->force_end >= 0;
 }
 
-/* A system has its elements sorted by type; those of a type are in the order of the model. */
+pw_plot_link *pw_plot_accompanied (const pw_plots *plots, const pw_element_info *companion) {
+  for (pw_plot_link *link = plots->link; link < plots->link + plots->links; link++)
+    if (link->kind->companion == companion->kind &&
+        strcmp (*(const char *const *)link->definition, companion->name) == 0)
+      return link;
+  return NULL;
+}
+
+/* A system has its elements sorted by type; those of a type are in the order of the model, which has no companions. */
 void pw_plot_find_shapes (pw_plots *plots) {
   int most = plots->links, elements, next = 0;
   const pw_element *e = pw_model_elements (plots->model, &elements);
@@ -133,8 +167,13 @@ void pw_plot_find_shapes (pw_plots *plots) {
     if (info.kind->each_body) continue;
     if (info.kind != last) next = 0;
     last = info.kind;
-    while (e[next].kind != last) next++;
+    while (next < elements && e[next].kind != last) next++;
+    pw_plot_link *link = next == elements ? pw_plot_accompanied (plots, &info) : NULL;
+    if (link) /* both have the same bodies */
+      link->companion_offset = link->force_offset + info.force - pw_system_element (plots->system, link->element).force;
+    if (next == elements) continue;
     shapes_add_points (plots, &e[next], info.body);
+    shapes_add_discs (plots, &e[next], info.body);
     if (plots->links < most) plots->links += shapes_link (plots, &e[next], i, &plots->link[plots->links]);
     next++;
   }
@@ -149,11 +188,12 @@ void pw_plot_forces (const pw_plots *plots, const pw_sample *sample, double *out
   if (pw_workspace_forces (plots->workspace, sample->t, sample->q, sample->v, sample->lambda, plots->forces, NULL) !=
       PW_OK)
     return;
-  for (int i = 0; i < plots->links; i++, out += 2)
-    if (plots->link[i].force_end < 0)
-      out[0] = out[1] = 0;
-    else
-      memcpy (out, plots->forces + plots->link[i].force_offset, 2 * sizeof *out);
+  for (int i = 0; i < plots->links; i++, out += 2) {
+    const pw_plot_link *link = &plots->link[i];
+    const double *force = plots->forces + link->force_offset, *more = plots->forces + link->companion_offset;
+    for (int k = 0; k < 2; k++)
+      out[k] = link->force_end < 0 ? 0 : force[k] + (link->companion_offset < 0 ? 0 : more[k]);
+  }
 }
 
 /* ---- Sizes ---- */
@@ -170,9 +210,28 @@ static void box_extend (pw_plot_box *box, const double *point) {
                         fmax (box->y1, point[1]) };
 }
 
+void pw_plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *disc, double out[3]) {
+  const double *placement =
+      disc->body < 0 ? (const double[3]){ 0 } : pw_plot_track (plots, i, &plots->bodies, disc->body);
+  pw_plot_point (placement, disc->at, out);
+  out[2] = placement[2];
+}
+
+/* Extends a box by the discs of the ground, or by those of bodies at sample i. */
+static void box_extend_discs (pw_plot_box *box, const pw_plots *plots, int i, int ground) {
+  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
+    double at[3], r = disc->at[2];
+    if ((disc->body == PLOT_GROUND) != ground) continue;
+    pw_plot_disc_centre (plots, i, disc, at);
+    box_extend (box, (const double[]){ at[0] - r, at[1] - r });
+    box_extend (box, (const double[]){ at[0] + r, at[1] + r });
+  }
+}
+
 pw_plot_box pw_plot_ground (const pw_plots *plots) {
   pw_plot_box box = PLOT_EMPTY;
   for (int g = 0; g < plots->grounds; g++) box_extend (&box, plots->ground[g]);
+  box_extend_discs (&box, plots, 0, 1);
   return box;
 }
 
@@ -187,6 +246,7 @@ double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i) {
     }
   }
   for (int w = 0; w < plots->wheels.drawn; w++) box_extend (box, pw_plot_track (plots, i, &plots->wheels, w));
+  box_extend_discs (box, plots, i, 0);
   return box->x1 >= box->x0 ? hypot (box->x1 - box->x0, box->y1 - box->y0) : 0;
 }
 
@@ -196,6 +256,8 @@ void pw_plot_measure (pw_plots *plots) {
   for (int b = 0; b < plots->bodies.drawn; b++)
     for (int k = 0; k < plots->shape[b].attachments; k++)
       reach = fmax (reach, hypot (plots->shape[b].attachment[k][0], plots->shape[b].attachment[k][1]));
+  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++)
+    if (disc->body >= 0) reach = fmax (reach, hypot (disc->at[0], disc->at[1]) + disc->at[2]);
   plots->size = size > 0 ? size : pw_system_length (plots->system);
   plots->symbol_unit = SHAPES_UNIT * (reach > 0 ? fmin (plots->size, 4 * reach) : plots->size);
 }
@@ -205,39 +267,51 @@ void pw_plot_measure (pw_plots *plots) {
  * The text of a symbol (pw_kind.symbol) consists of strokes separated by semicolons.  A stroke is a list of vertices
  * "a x y": the point p1 + a (p2 - p1) + u (x e + y n), as in pw_plot_stroke, where p1 and p2 are the points of the
  * first and the last body, u the unit of symbols, e a direction and n its normal to the left.  For a contact point e is
- * its heading; for a symbol with a rail, the field `heading` in the last body; otherwise the direction from p1 to p2,
- * or the x axis of the first body if these coincide.  In a rail, x = inf and x = -inf are the ends of the travel of p1
- * along e.
+ * its heading; for a symbol with a rail or a length, the field `heading` in the last body; otherwise the direction from
+ * p1 to p2, or the x axis of the first body if these coincide.  In a rail, x = inf and x = -inf are the ends of the
+ * travel of p1 along e.  "@NAME" in place of x or y is the length in that field of the element.
  *
  * "o a x y r" is a circle of radius u r around that point; "g1" and "g2" are the pitch circles of gears with the axles
- * p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is
- * below.  "NAME:" before a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
+ * p1 and p2 and the field `ratio`; "h y" is a hatching below the rail at this y.  A stroke whose last vertex is its
+ * first encloses an area, which hides what is below.  "d n NAME" is the disc of radius NAME of body n, around its
+ * point: it is drawn with the body.  "NAME:" before a stroke: it is drawn if that field is not zero or, of an optional
+ * number, given; "NAME=2:": if it is 2; "ground:": if the last body is the ground. */
 
 enum { SYMBOL_CIRCLE = 24 }; /* sides of the polygon of a circle */
 #define SYMBOL_HATCH 0.6     /* distance of the strokes of a hatching, in units of symbols */
 #define SYMBOL_OVERHANG 2.5  /* of a rail beyond the travel, in units of symbols */
 
-/* The value of a number or a choice of an element; 0 if it has no such field. */
 static double symbol_field (const pw_plot_link *link, const char *name, size_t length) {
-  const pw_field *f = link->kind->fields;
-  while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
-  if (f->name == NULL) return 0;
-  const void *at = (const char *)link->definition + f->offset;
-  return f->type == PW_NUMBER ? *(const double *)at : f->type == PW_CHOICE ? *(const int *)at : 0;
+  return shapes_field (link->kind, link->definition, name, length);
 }
 
 double pw_plot_heading (const pw_plot_link *link) {
   return symbol_field (link, "heading", 7);
 }
 
-/* Reads a condition; 0 if it does not hold. */
-static int symbol_condition (const pw_plot_link *link, const char **text) {
-  const char *name = *text, *colon = name + strcspn (name, ":;");
-  size_t length = strcspn (name, "=:");
-  if (*colon != ':') return 1;
-  double value = symbol_field (link, name, length);
-  *text = colon + 1;
-  return name[length] == '=' ? value == strtod (name + length + 1, NULL) : value != 0;
+/* 1 if a field of an element is not zero, or is an optional number that is given. */
+static int symbol_has (const pw_plot_link *link, const char *name, size_t length) {
+  const pw_field *f = link->kind->fields;
+  while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
+  return symbol_field (link, name, length) != 0 ||
+         (f->name && f->given && *(const int *)((const char *)link->definition + f->given) != 0);
+}
+
+/* Reads conditions; 0 if one of them does not hold. */
+static int symbol_conditions (const pw_plot_link *link, const char **text) {
+  int hold = 1;
+  for (const char *colon; (colon = *text + strcspn (*text, ":;"), *colon == ':'); *text = colon + 1) {
+    const char *name = *text + strspn (*text, " ");
+    const size_t length = strcspn (name, "=:");
+    if (name[length] == '=')
+      hold &= symbol_field (link, name, length) == strtod (name + length + 1, NULL);
+    else if (length == 6 && strncmp (name, "ground", length) == 0)
+      hold &= link->end[link->ends - 1].body == PLOT_GROUND;
+    else
+      hold &= symbol_has (link, name, length);
+  }
+  *text += strspn (*text, " ");
+  return hold;
 }
 
 /* A circle around a vertex, of radius u r or d |p2 - p1|: r or d is 0. */
@@ -250,42 +324,74 @@ static void symbol_circle (pw_plot_stroke *stroke, const double *centre, double 
   }
 }
 
-/* Reads numbers, at most `most`; returns how many there are. */
-static int symbol_numbers (const char **text, double *out, int most) {
-  char *end;
+/* Reads numbers, at most `most`, with lengths in the unit u; returns how many there are. */
+static int symbol_numbers (const pw_plot_link *link, double u, const char **text, double *out, int most) {
   int n = 0;
-  for (; n < most; n++, *text = end) {
+  for (char *end; n < most; n++) {
+    const char *name = *text + strspn (*text, " ");
+    if (*name == '@') {
+      const size_t length = strcspn (++name, " ;");
+      out[n] = symbol_field (link, name, length) / u, *text = name + length;
+      continue;
+    }
     out[n] = strtod (*text, &end);
     if (end == *text) break;
+    *text = end;
   }
   return n;
 }
 
-/* Reads the next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
-static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_stroke *stroke) {
+/* Hatching below the line from x0 to x1 at height y relative to p1 + d, of at most `most` strokes: at the same places
+ * relative to x = at, however long the line is.  Returns the number of strokes. */
+static int symbol_hatch (double x0, double x1, double y, double at, int upright, int most, pw_plot_stroke *stroke) {
+  double step = SYMBOL_HATCH;
+  int strokes = 0;
+  while ((x1 - x0) / step > PLOT_HATCHES) step *= 2;
+  for (double k = ceil ((x0 - at) / step); strokes < most && at + k * step < x1; k++) {
+    const double x = at + k * step, side = 0.4 * step;
+    stroke[strokes++] = (pw_plot_stroke){ 2, 0, upright, { { 1, x + side, y }, { 1, x - side, y - 2 * side } } };
+  }
+  return strokes;
+}
+
+/* The ends of a rail along e from p2, and the origin of the last body, in units of symbols. */
+typedef struct {
+  double low, high, origin;
+} symbol_rail;
+
+/* Reads the next part of a symbol; *strokes: room for them; their number, 0 if its conditions do not hold.  0 after the
+ * last one. */
+static int symbol_next (const pw_plot_link *link, double u, symbol_rail rail, const char **text, pw_plot_stroke *stroke,
+                        int *strokes) {
+  const int room = *strokes;
   double number[4];
-  stroke->vertices = stroke->upright = 0;
+  *stroke = (pw_plot_stroke){ 0, 0, 0, { { 0 } } };
+  *strokes = 0;
   while (isspace ((unsigned char)**text) || **text == ';') ++*text;
   if (**text == 0) return 0;
-  int drawn = symbol_condition (link, text);
-  *text += strspn (*text, " ");
+  const int drawn = symbol_conditions (link, text);
   if (**text == 'g') {
     /* a pitch circle of gears of the ratio i: the radii R1 and R2 = |i| R1 have R1 + R2 = |p2 - p1| if i < 0, and
      * |R1 - R2| = |p2 - p1| if i > 0 and one is a ring (Willis 1870); equal circles for i = 1 */
     const int second = (*text)[1] == '2';
     double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
     symbol_circle (stroke, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
-  } else if (**text == 'o' && ++*text && symbol_numbers (text, number, 4) == 4) {
+  } else if (**text == 'h' && ++*text && symbol_numbers (link, u, text, number, 1) == 1) {
+    *strokes = drawn ? symbol_hatch (rail.low, rail.high, number[0], rail.origin, 0, room, stroke) : 0;
+  } else if (**text == 'o' && ++*text && symbol_numbers (link, u, text, number, 4) == 4) {
     symbol_circle (stroke, number, number[3], 0);
   } else {
-    while (stroke->vertices < PLOT_VERTICES && symbol_numbers (text, number, 3) == 3)
+    while (stroke->vertices < PLOT_VERTICES && symbol_numbers (link, u, text, number, 3) == 3) {
+      if (isinf (number[1])) number[1] = number[1] > 0 ? rail.high : rail.low;
       memcpy (stroke->vertex[stroke->vertices++], (const double[]){ number[0], number[1], number[2], 0 },
               sizeof *stroke->vertex);
+    }
   }
   *text += strcspn (*text, ";");
+  if (*strokes > 0) return 1;
   stroke->closed = stroke->vertices > 2 &&
                    memcmp (stroke->vertex[0], stroke->vertex[stroke->vertices - 1], sizeof *stroke->vertex) == 0;
-  if (!drawn) stroke->vertices = 0;
+  *strokes = drawn && stroke->vertices > 0;
   return 1;
 }
 
@@ -319,53 +425,39 @@ static symbol_frame symbol_frame_at (const pw_plots *plots, int i, const pw_plot
   return frame;
 }
 
-/* The ends of a rail along e from p2, in units of symbols: beyond those of the travel of p1. */
-static void symbol_travel (const pw_plots *plots, const pw_plot_link *link, int samples, double *low, double *high) {
-  *low = *high = 0;
+/* A rail: beyond the ends of the travel of p1, and of its disc. */
+static symbol_rail symbol_travel (const pw_plots *plots, const pw_plot_link *link, int samples) {
+  const pw_plot_end_of *last = &link->end[link->ends - 1];
+  const double heading = pw_plot_heading (link), u = plots->symbol_unit;
+  const double beyond = SYMBOL_OVERHANG + symbol_field (link, "radius", 6) / u;
+  symbol_rail rail = { 0, 0, -(last->at[0] * cos (heading) + last->at[1] * sin (heading)) / u };
   for (int i = 0; i < samples && link->rail; i++) {
     symbol_frame frame = symbol_frame_at (plots, i, link);
-    double travel = -(frame.d[0] * frame.e[0] + frame.d[1] * frame.e[1]) / plots->symbol_unit;
-    *low = fmin (*low, travel), *high = fmax (*high, travel);
+    double travel = -(frame.d[0] * frame.e[0] + frame.d[1] * frame.e[1]) / u;
+    rail.low = fmin (rail.low, travel), rail.high = fmax (rail.high, travel);
   }
-  *low -= SYMBOL_OVERHANG, *high += SYMBOL_OVERHANG;
+  rail.low -= beyond, rail.high += beyond;
+  return rail;
 }
 
-/* Hatching below the line from x0 to x1 at height y relative to p1 + d; returns the number of strokes. */
-static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke *stroke) {
-  int strokes = (int)fmin (PLOT_HATCHES, ceil ((x1 - x0) / SYMBOL_HATCH));
-  for (int k = 0; k < strokes; k++) {
-    double x = x0 + (x1 - x0) * (k + 0.5) / strokes;
-    stroke[k] = (pw_plot_stroke){ 2, 0, upright, { { 1, x + 0.25, y }, { 1, x - 0.25, y - 0.5 } } };
-  }
-  return strokes;
-}
-
-/* The hatching of a rail on the ground; else the support of a joint, or of p1 on a rail, on the ground.  Returns the
- * number of strokes. */
-static int symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke *stroke) {
+/* The support of a joint, or of p1 on a rail, on the ground.  Returns the number of strokes. */
+static int symbol_support (pw_plot_stroke *stroke) {
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
-  const double groove = -.4; /* y of the lower edge of a slot, "1 -inf -.4" in its symbol; a rail has y = 0 */
-  if (link->rail && link->end[link->ends - 1].body < 0)
-    return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, stroke);
   *stroke = support;
-  return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, stroke + 1);
+  return 1 + symbol_hatch (-1.1, 1.1, -1.5, -0.9, 1, PLOT_HATCHES, stroke + 1);
 }
 
 int pw_plot_strokes (const pw_plots *plots, const pw_plot_link *link, int samples,
                      pw_plot_stroke stroke[PLOT_STROKES]) {
-  int ground = link->end[link->ends - 1].body < 0 || link->end[0].body < 0, n = 0;
-  double low, high;
+  const int first = link->end[0].body == PLOT_GROUND, last = link->end[link->ends - 1].body == PLOT_GROUND;
   if (link->kind->symbol == NULL) return 0;
-  symbol_travel (plots, link, samples, &low, &high);
-  if (ground) n = symbol_ground (low, high, link, stroke);
-  for (const char *text = link->kind->symbol; n < PLOT_STROKES && symbol_next (link, &text, &stroke[n]);) {
-    pw_plot_stroke *s = &stroke[n];
-    for (int k = 0; k < s->vertices; k++)
-      if (isinf (s->vertex[k][1])) s->vertex[k][1] = s->vertex[k][1] > 0 ? high : low;
-    n += s->vertices > 0;
-  }
+  const symbol_rail rail = symbol_travel (plots, link, samples);
+  int n = (link->rail ? first && !last : first || last) ? symbol_support (stroke) : 0, more;
+  for (const char *text = link->kind->symbol;
+       (more = PLOT_STROKES - n) > 0 && symbol_next (link, plots->symbol_unit, rail, &text, &stroke[n], &more);)
+    n += more;
   return n;
 }
 

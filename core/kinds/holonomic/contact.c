@@ -203,6 +203,7 @@ static const pw_field touch_fields[] = {
 const pw_kind pw_kind_contact = {
   .name = "contact",
   .about = "a point or disc of one body does not enter the half plane or disc of another, where it bounces",
+  .symbol = "d 0 radius; d 1 other_radius; other_radius=0: 1 -inf 0 1 inf 0; other_radius=0: h 0",
   TYPE (touch, pw_contact, touch),
   .bodies = 2,
   .rows = 1,

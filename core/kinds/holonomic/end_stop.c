@@ -86,6 +86,8 @@ static const pw_field stop_fields[] = {
 const pw_kind pw_kind_end_stop = {
   .name = "stop",
   .about = "a relative coordinate or angle of two bodies stays within limits, where it bounces",
+  .symbol = "low: what=0: 1 @low -1 1 @low 1; high: what=0: 1 @high -1 1 @high 1; "
+            "low: what=1: 1 -1 @low 1 1 @low; high: what=1: 1 -1 @high 1 1 @high",
   TYPE (stop, pw_end_stop, stop),
   .bodies = 2,
   .rows = 2,

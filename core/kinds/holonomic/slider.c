@@ -59,7 +59,7 @@ static const pw_quantity slider_reaction[] = {
 const pw_kind pw_kind_slider = {
   .name = "slider",
   .about = "a body slides along a line of another without rotating relative to it (prismatic joint)",
-  .symbol = "1 -inf 0 1 inf 0; 0 -1.2 -.7 0 1.2 -.7 0 1.2 .7 0 -1.2 .7 0 -1.2 -.7",
+  .symbol = "ground: h 0; 1 -inf 0 1 inf 0; 0 -1.2 -.7 0 1.2 -.7 0 1.2 .7 0 -1.2 .7 0 -1.2 -.7",
   TYPE (slider, pw_slider, line),
   .bodies = 2,
   .rows = 2,

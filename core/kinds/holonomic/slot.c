@@ -20,7 +20,7 @@ static const pw_field slot_fields[] = {
 const pw_kind pw_kind_slot = {
   .name = "slot",
   .about = "a point of one body stays on a line of another",
-  .symbol = "1 -inf .4 1 inf .4; 1 -inf -.4 1 inf -.4; o 0 0 0 .3",
+  .symbol = "1 -inf .4 1 inf .4; 1 -inf -.4 1 inf -.4; o 0 0 0 .3; ground: h -.4",
   TYPE (slot, pw_slot, line),
   .bodies = 2,
   .rows = 1,

@@ -3,7 +3,7 @@
 
 # ---- Snapshots of the motion: earlier ones fainter, the last one with symbols; paths of the markers ----
 # Above: bodies (number of those with a name), body[i], by_time (1: colours show the time), markers (a list of blocks of
-# wheels.dat, from 0), areas (a list of the colours of bodies with an area), ground (1: ground.dat exists), t_end and
+# wheels.dat, from 0), areas (a list of the colours of bodies with an area; 0: the ground), ground (1: ground.dat exists), t_end and
 # t_closeup as for plane.gp.
 # Blocks of the data file: 0 to 3 bodies, wheels, point masses, rods before the end; 4 to 7 the same at the end; 8 and 9
 # open and closed strokes of symbols.  Columns: x, y, t, number of the body.
@@ -18,13 +18,13 @@ shade(body, strength) = (c = body > 0 ? rgb[(int(body) - 1) % 8 + 1] : 0x555555,
   mixed(c, 65536, strength) + mixed(c, 256, strength) + mixed(c, 1, strength))
 fade(t, end) = 0.22 + 0.4*t/end
 # Parts of the plot command for blocks of the data file: bodies by colour, before and at the end; the areas of bodies of
-# colour c; symbols.
+# colour c, 0: of the ground; symbols.
 block(k, strength, look) = sprintf(", %s index %d using 1:2:%s with %s%s notitle", file, k, \
   by_time ? '3' : '(shade($4, '.strength.'))', look, by_time ? ' lc palette' : ' lc rgb variable')
 before(k, look) = block(k, 'fade($3, '.span.')', look)
 now(k, look) = block(k, '1', look)
-area(c) = sprintf(", %s index 4 using ($4 > 0 && (int($4) - 1) %% 8 == %d ? $1 : NaN):2 ", file, c - 1). \
-  sprintf("with filledcurves closed fc rgb '%s' fs transparent solid 0.25 noborder notitle", colour(c + 0))
+area(c) = sprintf(", %s index 4 using (($4 > 0 ? (int($4) - 1) %% 8 + 1 : 0) == %d ? $1 : NaN):2 ", file, c + 0). \
+  sprintf("with filledcurves closed fc rgb '%s' fs transparent solid 0.25 noborder notitle", c > 0 ? colour(c + 0) : '#999999')
 symbols(k, look) = sprintf(", %s index %d using 1:2 with %s notitle", file, k, look)
 array images[2] = ['', '']
 do for [i = 1:panels] {
