@@ -54,6 +54,7 @@ typedef struct pw_events {
   unsigned char *armed;                 /* 1: u has left its root, so that it may return there */
   unsigned char *triggered;             /* 1: at the root that is the state reached */
   unsigned char *rests;                 /* 1: u is 0 after an impact */
+  unsigned char *struck;                /* 1: it has had an impact since the last motion that was not too short */
   unsigned char *spare;                 /* 1: it holds since others do, on which it depends: its multiplier is 0 */
   int *partner;                         /* of friction: its normal equation; -1: none */
   int *place;                           /* in D; -1: not in it */
@@ -89,8 +90,8 @@ static int events_allocate (pw_run *r) {
                               &x->direction,  &x->bias, &x->reach, &x->d.towards, &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
   signed char **const mode[] = { &x->mode, &x->before, &x->d.trial };
-  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests,      &x->d.blocked,
-                                   &x->spare, &x->d.fixed,   &x->d.redundant };
+  unsigned char **const flag[] = { &x->armed,     &x->triggered, &x->rests,   &x->struck,
+                                   &x->d.blocked, &x->spare,     &x->d.fixed, &x->d.redundant };
   int **const index[] = { &x->row, &x->d.list, &x->d.held, &x->partner, &x->place, &x->d.normal };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
     x->d.limit = x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
@@ -508,20 +509,22 @@ static int events_open (const pw_run *r, int i, double g) {
   return (x->row[i] < r->s->holonomic) && !x->triggered[i] && x->mode[i] * g > EVENTS_SMALL * x->unit[i];
 }
 
-/* Impulses with the restitution of each equation times `part`; *loss: the energy that they dissipate.  After a motion
- * too short to be resolved, all these equations hold: it is the end of an accumulation, also of a block that rocks. */
+/* Impulses with the restitution of each equation times `part`; *loss: the energy that they dissipate.  If one of the
+ * equations has had an impact since the last motion that was resolved, they all hold: it is the end of an accumulation,
+ * also of a block that rocks. */
 static int impact_try (pw_events *x, double part, int *count, double *loss) {
+  int ends = 0;
+  for (int k = 0; k < x->d.n && x->fell; k++) ends |= x->d.normal[k] < 0 && x->struck[x->d.list[k]];
   for (int k = 0; k < x->d.n; k++) {
-    const int i = x->d.list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
+    const int i = x->d.list[k], slow = ends || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
     x->d.b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->d.normal[k] < 0 ? part * x->limit[i].restitution : 0));
   }
-  for (int k = 0; k < x->d.n && x->fell; k++)
+  for (int k = 0; k < x->d.n && ends; k++)
     if (x->d.normal[k] < 0) x->d.lo[k] = -INFINITY, x->d.hi[k] = INFINITY, x->d.trial[k] = 0;
-  const int status = x->fell ? pw_decision_pivot (&x->d, 1) : pw_decide (&x->d, count);
+  const int status = ends ? pw_decision_pivot (&x->d, 1) : pw_decide (&x->d, count);
   *loss = 0;
   for (int k = 0; k < x->d.n; k++)
-    *loss += x->d.x[k] * (x->u_before[x->d.list[k]] + pw_decision_z (&x->d, k) - x->d.b[k]) / 2;
-  for (int k = 0; k < x->d.n; k++) *loss += x->d.x[k] * x->u_before[x->d.list[k]] / 2;
+    *loss += x->d.x[k] * (x->u_before[x->d.list[k]] + (pw_decision_z (&x->d, k) - x->d.b[k]) / 2);
   return status;
 }
 
@@ -574,6 +577,7 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   impact_end (r, r->v);
   for (int k = 0; k < x->d.n; k++) {
     x->impulse[x->d.list[k]] = -x->d.x[k];
+    x->struck[x->d.list[k]] |= x->d.x[k] != 0;
     x->rests[x->d.list[k]] = fabs (x->u[x->d.list[k]]) <= EVENTS_SMALL * x->unit[x->d.list[k]];
   }
   return PW_OK;
@@ -816,6 +820,7 @@ static int events_stop_at (pw_run *r, double t, pw_error *error) {
   if (status != PW_OK) return status;
   events_trigger (r, x->now);
   x->pending = 1, x->start_t = NAN;
+  if (!x->fell) memset (x->struck, 0, (size_t)x->count);
   if (t == r->t) return PW_OK;
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
   memcpy (r->ledger, r->ledger_at, (size_t)r->entries * sizeof *r->ledger);
@@ -1168,6 +1173,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->mode, (size_t)x->count);
   pw_archive_bytes (a, x->triggered, (size_t)x->count);
   pw_archive_bytes (a, x->spare, (size_t)x->count);
+  pw_archive_bytes (a, x->struck, (size_t)x->count);
   pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
   pw_archive_bytes (a, x->direction, (size_t)x->count * sizeof *x->direction);
   pw_archive_bytes (a, x->bias, (size_t)x->count * sizeof *x->bias);

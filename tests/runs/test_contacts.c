@@ -473,4 +473,44 @@ TEST (random_scenes) {
   }
 }
 
+/* ---- Four discs in a row: impacts that follow each other within less than the tolerance ---- */
+
+static double contacts_gap;
+
+SCENE (contacts_row) {
+  static const char *const name[] = { "a", "b", "c", "d" }, *const between[] = { "ab", "bc", "cd" };
+  for (int i = 0; i < 4; i++) {
+    pw_add_body (m, &(pw_body){ .name = name[i],
+                                .mass = 1,
+                                .inertia = 0.01,
+                                .start = { i == 0 ? -1 : (0.2 + contacts_gap) * (i - 1) },
+                                .rate = { i == 0 } });
+    if (i > 0)
+      pw_add_contact (m, &(pw_contact){ .name = between[i - 1],
+                                        .body = { name[i - 1], name[i] },
+                                        .radius = 0.1,
+                                        .other_radius = 0.1,
+                                        .restitution = 1 });
+  }
+}
+
+/* However small the gaps, each disc stops at the next one, and the last one leaves with the velocity of the first. */
+TEST (row_of_discs) {
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "radau+ggl", "bdf+projection", "ida+ggl" };
+  static const double gap[] = { 1e-10, 1e-8, 1e-6, 1e-4 };
+  for (int i = 0; i < 4; i++) {
+    contacts_gap = gap[i];
+    pw_system *s = scene_system (&contacts_row_table, NULL);
+    for (int m = 0; m < 5; m++) {
+      const char *what = check_text ("gap %g, %s", gap[i], method[m]);
+      pw_run *r = runs_open (s, method[m], &(pw_settings){ .span = 2 });
+      const pw_sample x = runs_to (r, 2);
+      for (int body = 0; body < 4; body++)
+        check_close (what, x.v[3 * body], body == 3, 2e-4, "rtol 1e-6, relative to the radius, thrice");
+      pw_run_close (r);
+    }
+    pw_system_free (s);
+  }
+}
+
 const check_fixture fixture = { NULL, NULL };
