@@ -195,30 +195,33 @@ static void given_velocities (pw_tangent *x, pw_element_batch *k) {
   if (!x->scatter.recording) pw_evaluate_block (x->run->w, k, PW_JW_Q, x->block);
 }
 
+/* Row i of those of a batch, if its multiplier is given: its derivatives by the signals and velocities it follows. */
+static void given_add_row (pw_tangent *x, pw_element_batch *k, int i, int row, int col_q, int col_v) {
+  const pw_run *r = x->run;
+  const int n = r->s->coords;
+  const pw_given by = r->given[k->row + i];
+  for (int m = 0; m < 2 && by.is_given; m++) {
+    const pw_source *source = by.source[m] < 0 ? NULL : r->w->source + by.source[m];
+    for (int read = 0; source && read < source->reads; read++) {
+      const int j = source->state[read];
+      given_add (x, k, i, row, j < n ? col_q + j : col_v + j - n, by.by_source[m] * source->x[source->reads + read]);
+    }
+    for (int c = 0; by.first >= 0 && c < k->b.cols; c++) {
+      const int j = pw_global (k, i / k->kind->rows, c), at = (by.first - k->row + m) * k->b.cols + c;
+      if (j >= n) continue;
+      given_add (x, k, i, row, col_v + j, by.by_u[m] * k->J[at]);
+      given_add (x, k, i, row, col_q + j, by.by_u[m] * x->block[at]);
+    }
+  }
+}
+
 /* Adds J^T d lambda/d(q, v) of the equations whose given multipliers depend on states. */
 static void tangent_add_given (pw_tangent *x, int row, int col_q, int col_v) {
   const pw_run *r = x->run;
-  const int n = r->s->coords;
   for (pw_element_batch *k = r->w->batch; k < r->w->batch + r->s->constraints; k++) {
-    if (k->kind->limits) given_velocities (x, k);
-    for (int i = 0; i < k->b.count * k->kind->rows && k->kind->limits; i++) {
-      const pw_given by = r->given[k->row + i];
-      if (!by.is_given) continue;
-      for (int m = 0; m < 2; m++) {
-        const pw_source *source = by.source[m] < 0 ? NULL : r->w->source + by.source[m];
-        for (int read = 0; source && read < source->reads; read++) {
-          const int j = source->state[read];
-          given_add (x, k, i, row, j < n ? col_q + j : col_v + j - n,
-                     by.by_source[m] * source->x[source->reads + read]);
-        }
-        for (int c = 0; by.first >= 0 && c < k->b.cols; c++) {
-          const int j = pw_global (k, i / k->kind->rows, c), at = (by.first - k->row + m) * k->b.cols + c;
-          if (j >= n) continue;
-          given_add (x, k, i, row, col_v + j, by.by_u[m] * k->J[at]);
-          given_add (x, k, i, row, col_q + j, by.by_u[m] * x->block[at]);
-        }
-      }
-    }
+    if (!k->kind->limits) continue;
+    given_velocities (x, k);
+    for (int i = 0; i < k->b.count * k->kind->rows; i++) given_add_row (x, k, i, row, col_q, col_v);
   }
 }
 
