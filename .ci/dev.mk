@@ -1,12 +1,13 @@
 # What developers need: checks, further builds, fuzzing, benchmarks, packages.  Included by the Makefile.
 
 .PHONY: layers words san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-check bench-quick bench-engine \
-        bench-effects hard basic figures deb
+        bench-effects hard basic figures options deb
 
 help::
 	@echo
 	@echo 'For developers:'
 	@echo 'make figures          all figures of README and docs, into docs/figures/'
+	@echo 'make options          the tables of options in docs, from --help'
 	@echo 'make bench            all measurements, and docs/benchmarks.md; continues where it was stopped'
 	@echo 'make bench-check      instructions per step against benchmarks/steps.txt; names those that grew by more than 3 %'
 	@echo 'make bench-quick      the processor time of runs on this machine'
@@ -32,6 +33,10 @@ words:
 
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
+
+options: all
+	@for page in $$(grep -l '^<!-- options of ' docs/*.md); do \
+	  sh core/cli/options.sh $(PROGRAM) $$page >$(BUILD)/options && cp $(BUILD)/options $$page; done
 
 SOURCES := $(foreach d,core solvers models tests benchmarks docs,$(wildcard $(addprefix $(d)/,*.[ch] */*.[ch] */*/*.[ch] */*/*/*.[ch])))
 

@@ -201,7 +201,7 @@ PW_COMMANDS (PW_COMMAND)
       "always or never")
 #define PW_METHOD_FILE_OPTION                                            \
   PW_LIST_OPTION (pw_cli_line, method_files, "method-file", 0, "FILE.c", \
-                  "Compile methods of your own, which end with PW_METHOD_FILE, and use them by name; repeatable")
+                  "Compile a file of methods of your own, which are then used by name; repeatable")
 #define PW_METHOD_OPTIONS                                                           \
   PW_OPTION_GROUP ("Integration"),                                                  \
       PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",                 \

@@ -2,6 +2,7 @@
 # README.md and docs/ show what the program prints: each block that begins with "$ build/pinwheel" is run, and its lines must
 # be in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line depends on the machine:
 # times, and results of a drifting method at a singular configuration.
+# Tables of options are those that core/cli/options.sh makes.
 # A YAML block after "save as `NAME`:" becomes a file for the commands after it.  Run from the top folder; reads PINWHEEL.
 
 . "$(dirname "$0")/../support/report.sh"
@@ -56,6 +57,11 @@ for page in README.md docs/*.md; do
     [ ! -s "$work/log" ]
     report "$page: pinwheel $command" $?
   done
+done
+
+for page in $(grep -l '^<!-- options of ' docs/*.md); do
+  sh core/cli/options.sh "$pinwheel" "$page" | diff "$page" - >"$work/log"
+  report "$page: tables of options, else make options" $?
 done
 
 models=$(find models -name '*.c' -o -name '*.yaml' | sed 's,.*/,,; s/\..*//' | sort)

@@ -972,20 +972,24 @@ static int fit_command (void *options, pw_error *error) {
 
 static const struct poptOption fit_options_table[] = {
   PW_OPTION_GROUP ("Fit"),
-  PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
-                  "Measured data, used up to --t-end: a table with t and columns named as those of `run`; empty cells "
-                  "are gaps"),
+  PW_TEXT_OPTION (
+      pw_fit, data_path, "data", 0, "FILE.csv",
+      "Measured data, used up to --t-end: a table with t and columns named as those of `run`, in any order and "
+      "unit; empty cells and nan are gaps"),
   PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
   PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
   PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
   PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
-  PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
-                  "Determine a parameter or initial value, such as frame.vx, within bounds if given; repeatable"),
+  PW_LIST_OPTION (
+      pw_fit, free, "free", 0, "NAME[=LOW:HIGH[:log]]",
+      "Determine a parameter or initial value, such as frame.vx, from the model's value on, within bounds or "
+      "its domain; repeatable"),
   PW_LIST_OPTION (pw_fit, sigma_texts, "sigma", 0, "COLUMN=VALUE",
                   "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
   PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
   PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
-                  "Search from N points: the initial values, and others between the bounds (default 1)"),
+                  "Search from the model's values and from N - 1 points between the bounds, without bounds within the "
+                  "value's own size of it (default 1)"),
   PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv",
                   "Write data, model values and residuals, or as FILE.npz or FILE.json"),

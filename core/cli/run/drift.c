@@ -297,8 +297,8 @@ static const struct poptOption drift_options[] = {
   PW_STEP_OPTIONS,
   PW_LIST_OPTION (
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",
-      "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; repeatable. RANGE: "
-      "V1,V2,... or LOW:HIGH[:COUNT][:log]"),
+      "Values of an option: alpha and beta [1/s] of baumgarte, in all pairs (default 1 to 1000), every [steps] of "
+      "projection, in both metrics (default 1 to 100); repeatable. RANGE: V1,V2,... or LOW:HIGH[:COUNT][:log]"),
   PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
   PW_TEXT_OPTION (pw_study, table_path, "output", 'o', "FILE.csv", "Write the table of all runs"),
