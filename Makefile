@@ -51,7 +51,8 @@ FILES   := $(wildcard core/files/*.c)
 CLI     := $(wildcard core/cli/*.c core/cli/*/*.c)
 CORE    := $(filter-out $(FILES) $(CLI),$(wildcard core/*/*.c core/kinds/*/*.c))
 SOLVERS := $(wildcard solvers/*/*.c)
-MODELS  := $(wildcard models/*.c)
+MODELS  := $(wildcard models/*.c models/*/*.c)
+TEXTS   := $(wildcard models/*.yaml models/*/*.yaml)
 QUICK   := $(wildcard tests/*/test_*.c)
 SLOW    := $(wildcard tests/*/slow_*.c)
 SHELLS  := $(filter-out tests/support/%,$(wildcard tests/*/*.sh))
@@ -70,7 +71,7 @@ BASE_OBJ  := $(call obj,$(addprefix core/base/,text.c store.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
-PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(MODELS) $(wildcard models/*.yaml))
+PLUGINS   := $(addprefix $(BUILD)/models/,$(notdir $(MODELS:.c=.so) $(MODELS) $(TEXTS)))
 # The longest files come first, so that no processor waits for them at the end.
 LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes specialise plots jumps memory specialised)
 TESTS     := $(LONGEST) $(filter-out $(LONGEST),$(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK))))
@@ -142,7 +143,7 @@ $(BUILD)/obj/%.o: %.c | $(FIRST)
 $(call obj,$(BENCH) $(EMBED)): | $(INCLUDES)
 
 -include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(EMBED)))
--include $(MODELS:%.c=$(BUILD)/obj/%.d)
+-include $(patsubst %.c,$(BUILD)/obj/plugins/%.d,$(notdir $(MODELS)))
 
 # The page of animations and the templates of figures and new models become part of the program, as C strings, one per line.
 AS_STRINGS := sed -e 's/\\/&&/g' -e 's/"/\\"/g' -e 's/.*/"&\\n",/'
@@ -202,20 +203,24 @@ $(BUILD)/include/%.h: solvers/%.h
 $(BUILD)/include/%.h: core/files/%.h
 	@mkdir -p $(@D) && cp $< $@
 
+# Models are in folders by subject, and in one folder of a build, as of an installation.
+vpath %.c $(sort $(dir $(MODELS)))
+vpath %.yaml $(sort $(dir $(TEXTS)))
+
 # A plug-in links to nothing: it finds Pinwheel in the program that opens it.
-$(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
-	@mkdir -p $(@D) $(BUILD)/obj/models
+$(BUILD)/models/%.so: %.c | $(INCLUDES) $(FIRST)
+	@mkdir -p $(@D) $(BUILD)/obj/plugins
 	$(call say,PLUGIN)
 	$(Q)$(CC) $(STRICT) $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed -shared \
-	  -MMD -MP -MF $(BUILD)/obj/models/$*.d -o $@ $< -lm
+	  -MMD -MP -MF $(BUILD)/obj/plugins/$*.d -o $@ $< -lm
 
 # A link: $(BUILD)/pinwheel searches models/, too, and a file found twice counts once.  It is relative, so that the tree can be
 # copied.  A plug-in of the same name, from when the model was written in C, is removed.
 TO_SOURCE = ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
-$(BUILD)/models/%.yaml: models/%.yaml
+$(BUILD)/models/%.yaml: %.yaml
 	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) $(@:.yaml=.c)
 	@$(TO_SOURCE)
-$(BUILD)/models/%.c: models/%.c
+$(BUILD)/models/%.c: %.c
 	@mkdir -p $(@D)
 	@$(TO_SOURCE)
 
@@ -285,7 +290,7 @@ D    := $(DESTDIR)$(PREFIX)
 MAN  := docs/pinwheel.1 docs/pinwheel-model.5
 DOCS := README.md $(filter-out $(MAN) docs/figures.sh,$(wildcard docs/*.*)) # pages have links to the other files
 FIGURES  := $(wildcard docs/figures/*)
-EXAMPLES := $(EMBED) $(wildcard models/*.c) core/kinds/forces/torque.c \
+EXAMPLES := $(EMBED) $(MODELS) core/kinds/forces/torque.c \
             $(addprefix core/kinds/,batch.h contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
 
 # Where Python looks for packages below PREFIX: Debian's folder for /usr, otherwise that of the Python version.

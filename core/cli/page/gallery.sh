@@ -31,8 +31,7 @@ strong { display: block; }
 <p>Each page simulates a vehicle or a linkage in the browser: move a slider and see the motion, its error and its cost change.</p>
 <ul>
 END
-  (cd "$models" && LC_ALL=C ls *.c *.yaml) | while read -r file; do
-    name=${file%.*} path=$models/$file
+  find "$models" -name '*.[cy]*' | sed 's,.*/\(.*\)\..*,\1 &,' | LC_ALL=C sort | while read -r name path; do
     "$program" page "$path" -o "$site/$name.html" >&2
     about=$("$program" show "$path" | head -n 1 | escape)
     picture=$figures/gallery-$name.png
