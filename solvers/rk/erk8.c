@@ -7,7 +7,7 @@
  * the three on a smooth motion.
  *
  * The step-size control uses the previous error as well (`memory`), since a periodic drive makes errors rise and fall:
- * on the EzyRoller (models/ezyroller.c) one step in five is rejected without it, about one in a hundred with it. */
+ * on the EzyRoller one step in five is rejected without it, about one in a hundred with it. */
 #include "rk.h"
 
 /* clang-format off */

@@ -255,7 +255,8 @@ TEST (bad_files) {
   cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense (;\n");
   assert_int_equal (cli_run ("CC=\"cc $(printf -- '-DA%d ' $(seq 24))\" pinwheel run @/broken.c"), 2);
   assert_non_null (strstr (cli_err, "the C compiler's command in CC has more than 24 words"));
-  cli_good ("cp models/ezyroller.c @/e.c; env --ignore-signal=CHLD \"${PINWHEEL:-build/pinwheel}\" show @/e.c");
+  cli_good (
+      "cp models/vehicles/ezyroller.c @/e.c; env --ignore-signal=CHLD \"${PINWHEEL:-build/pinwheel}\" show @/e.c");
   assert_int_equal (cli_run ("CC=/no/compiler pinwheel run @/broken.c"), 2);
   assert_non_null (strstr (cli_err, "cannot run the C compiler \"/no/compiler\""));
   assert_int_equal (cli_run ("CC=clang PATH=/nonexistent ${PINWHEEL:-build/pinwheel} run @/broken.c"), 2);
@@ -388,14 +389,15 @@ TEST (one_voice) {
 /* Nothing stays of what was compiled, whether that works, fails or is interrupted: Ctrl-C waits until the folder is
  * gone. */
 TEST (compiled) {
-  cli_good ("mkdir @/tmp && TMPDIR=@/tmp pinwheel run models/ezyroller.c -t 0.1 --json @/compiled.json && ls @/tmp");
+  cli_good (
+      "mkdir @/tmp && TMPDIR=@/tmp pinwheel run models/vehicles/ezyroller.c -t 0.1 --json @/compiled.json && ls @/tmp");
   assert_string_equal (cli_out, "");
   cli_write ("wrong.c", "int x = ;\n");
   assert_int_equal (cli_run ("TMPDIR=@/tmp pinwheel run @/wrong.c; ls @/tmp"), 0);
   assert_string_equal (cli_out, "");
   cli_write ("interrupting", "#!/bin/sh\nkill -TERM $PPID\nsleep 0.2\nexec cc \"$@\"\n");
   cli_run ("chmod +x @/interrupting; (TMPDIR=@/tmp CC=@/interrupting "
-           "\"${PINWHEEL:-build/pinwheel}\" run models/ezyroller.c -t 0.1); echo $?; sleep 0.4; ls @/tmp");
+           "\"${PINWHEEL:-build/pinwheel}\" run models/vehicles/ezyroller.c -t 0.1); echo $?; sleep 0.4; ls @/tmp");
   assert_string_equal (cli_out, "130\n");
 }
 

@@ -22,7 +22,7 @@
 
 TEST (uses) {
   cli_good ("mkdir -p @/u/D && cd @/u && cp $OLDPWD/tests/models/signals.yaml m.yaml && : >none");
-  cli_good ("cp models/car.yaml @/u/car.yaml; printf 't,M\\n0,1\\n1,2\\n' >@/u/M.csv");
+  cli_good ("cp models/vehicles/car.yaml @/u/car.yaml; printf 't,M\\n0,1\\n1,2\\n' >@/u/M.csv");
   cli_write ("u/table.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n"
                              "  - {torque: T, body: [a, ground], value: {table: {file: M.csv, columns: [t, M]}}}\n");
   cli_good (

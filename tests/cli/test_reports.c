@@ -69,8 +69,9 @@ TEST (unbound) {
 TEST (literals) {
   static const char *const name[] = { "null", "true", "1e3" };
   for (int i = 0; i < 3; i++) {
-    cli_good (check_text ("cp models/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log",
-                          name[i], name[i]));
+    cli_good (check_text (
+        "cp models/linkages/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log", name[i],
+        name[i]));
     assert_true (cli_says (cli_file ("it.json"), "model", name[i]));
   }
 }

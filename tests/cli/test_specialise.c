@@ -183,7 +183,8 @@ TEST (killed_compiler) {
   specialise_says ("general engine: the generated code cannot be compiled or loaded\n");
   assert_null (strstr (cli_out, ".c\n"));
   assert_non_null (strstr (cli_err, "/cc\" was ended by a signal: Killed\n"));
-  cli_bad ("CC=@/cc pinwheel show models/ezyroller.c", 1, "the C compiler \"@/cc\" was ended by a signal: Killed");
+  cli_bad ("CC=@/cc pinwheel show models/vehicles/ezyroller.c", 1,
+           "the C compiler \"@/cc\" was ended by a signal: Killed");
 }
 
 /* Neither does a compiler that writes something else, or nothing, stop a run; and its object is not kept. */
@@ -324,7 +325,7 @@ TEST (names) {
   pw_file_close (f);
   cli_good (
       FRESH
-      "cp models/pendulum.yaml '@/*\\ #\"$(kill $$)`kill $$`;&.yaml'\n"
+      "cp models/linkages/pendulum.yaml '@/*\\ #\"$(kill $$)`kill $$`;&.yaml'\n"
       "pinwheel run '@/*\\ #\"$(kill $$)`kill $$`;&.yaml' -t 0.01 --specialise always | grep -c 'code specialised'");
   assert_string_equal (cli_out, "1\n");
 }

@@ -10,7 +10,7 @@
 #include "trial.h"
 
 #define pw_plugin redundant_parallelogram
-#include "../../models/redundant-parallelogram.c"
+#include "../../models/linkages/redundant-parallelogram.c"
 #undef pw_plugin
 
 /* ---- Three cranks with one coupler ---- */

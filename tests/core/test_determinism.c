@@ -14,7 +14,7 @@ static const struct {
   const char *scene, *parameter;
   double value, t_end;
 } same_scenes[] = {
-  { "models/ezyroller.c", NULL, 0, 1 },           { "models/ezyroller.c", "m2", 0.1, 1 },
+  { "models/vehicles/ezyroller.c", NULL, 0, 1 },  { "models/vehicles/ezyroller.c", "m2", 0.1, 1 },
   { "tests/scenes/zoo.c", NULL, 0, 0.4 },         { "tests/scenes/chain.c", "links", 5, 0.4 },
   { "tests/scenes/chain.c", "links", 150, 0.02 }, { "tests/scenes/feedback.yaml", NULL, 0, 0.4 },
 };

@@ -36,7 +36,8 @@ static void locale_write (const char *model, const char *name) {
 }
 
 TEST (comma) {
-  static const char *const model[] = { "tests/models/arm.yaml", "models/chain.yaml", "models/ezyroller.c" };
+  static const char *const model[] = { "tests/models/arm.yaml", "models/linkages/chain.yaml",
+                                       "models/vehicles/ezyroller.c" };
   if (cli_run ("localedef -i de_DE -f UTF-8 @/de_DE.UTF-8") != 0) skip ();
   for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
     locale_write (model[i], "plain");

@@ -1,4 +1,4 @@
-/* Element types of a plug-in, as in models/elliptic-wire.c: its reference, every method, the program, the self-test. */
+/* Element types of a plug-in, as in elliptic-wire.c: its reference, every method, the program, the self-test. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,7 +16,7 @@
 /* Eccentricity and semi-minor axis of the ellipse; the semi-major axis is 1 m, the attraction 1 N m^2 / r^2. */
 static const double own_e = 0.6, own_b = 0.8;
 
-/* models/elliptic-wire.c; factor: of the speed of a planet. */
+/* models/linkages/elliptic-wire.c; factor: of the speed of a planet. */
 static gallery_scene own_open (double factor) {
   return gallery_load ("elliptic-wire", "factor", factor, NULL);
 }

@@ -45,7 +45,7 @@ static void checkpoint_remove (void) {
 
 static int checkpoint_command (int method, int resume) {
   const char *argv[] = { "pinwheel run",
-                         "models/pendulum.yaml",
+                         "models/linkages/pendulum.yaml",
                          "-t0.1",
                          "--step=1e-3",
                          "--rtol=1e-9",

@@ -155,7 +155,7 @@ static void fuzz_free (void) {
 struct pw_system *fuzz_pendulum (void) {
   pw_error error = { 0 };
   if (fuzz_system) return fuzz_system;
-  fuzz_model_file = pw_file_open ("models/pendulum.yaml", &error);
+  fuzz_model_file = pw_file_open ("models/linkages/pendulum.yaml", &error);
   fuzz_model = fuzz_model_file ? pw_file_model (fuzz_model_file, &error) : NULL;
   if (fuzz_model && pw_model_build (fuzz_model, &error) == PW_OK) fuzz_system = pw_system_compile (fuzz_model, &error);
   if (fuzz_system == NULL) {

@@ -55,7 +55,7 @@ class Curve:
 
 
 def model(name):
-    y = yaml.safe_load(open(f"models/{name}.yaml"))
+    y = yaml.safe_load(open(f"models/vehicles/{name}.yaml"))
     path = y.get("paths", [None])[0]
     return ({p["name"]: float(p["value"]) for p in y["parameters"]},
             path and Curve(path["points"], path.get("closed", False)))

@@ -14,9 +14,12 @@ static const struct {
   const char *scene, *parameter;
   double value, t_end;
 } saved_scenes[] = {
-  { "models/ezyroller.c", NULL, 0, 1 },          { "models/ezyroller.c", "omega", 20, 1 },
-  { "tests/scenes/zoo.c", NULL, 0, 0.3 },        { "models/redundant-parallelogram.c", NULL, 0, 0.4 },
-  { "models/n-four-bar.yaml", NULL, 0, 0.4 },    { "tests/scenes/chain.c", "links", 30, 0.05 },
+  { "models/vehicles/ezyroller.c", NULL, 0, 1 },
+  { "models/vehicles/ezyroller.c", "omega", 20, 1 },
+  { "tests/scenes/zoo.c", NULL, 0, 0.3 },
+  { "models/linkages/redundant-parallelogram.c", NULL, 0, 0.4 },
+  { "models/linkages/n-four-bar.yaml", NULL, 0, 0.4 },
+  { "tests/scenes/chain.c", "links", 30, 0.05 },
   { "tests/models/ezyroller.yaml", NULL, 0, 1 },
 };
 

@@ -74,10 +74,10 @@ try () {
 
 checks= forbidden=
 try snakeboard snakeboard swing 0.55 10
-checks=yes try 'a model in C' models/ezyroller.c a 0.7 10
-forbidden='worker-src blob:;' try 'without Workers' models/ezyroller.c a 0.7 10
-try 'sliders whose ends are moved' models/slider-crank.c l1 1.2 1
-try 'redundant constraints' models/redundant-parallelogram.c l 1.25 3
+checks=yes try 'a model in C' models/vehicles/ezyroller.c a 0.7 10
+forbidden='worker-src blob:;' try 'without Workers' models/vehicles/ezyroller.c a 0.7 10
+try 'sliders whose ends are moved' models/linkages/slider-crank.c l1 1.2 1
+try 'redundant constraints' models/linkages/redundant-parallelogram.c l 1.25 3
 try 'initial values of --start' pendulum m 2 1 --start bob.vy=2
 try 'copies and included files' tests/models/arms.yaml n 3 1
 
@@ -191,7 +191,7 @@ done
 "$pinwheel" page snakeboard --method ida+ggl -o "$work/x.html" 2>"$work/log"
 [ $? = 2 ] && grep -q 'pages have rk4, erk5, erk8, radau' "$work/log" && [ ! -e "$work/x.html" ]
 report 'a method that pages do not have is refused' $?
-sed 's/trim: 0.1/trom: 0.1/' models/snakeboard.yaml >"$work/preset.yaml"
+sed 's/trim: 0.1/trom: 0.1/' models/vehicles/snakeboard.yaml >"$work/preset.yaml"
 "$pinwheel" page "$work/preset.yaml" -o "$work/x.html" 2>"$work/log"
 [ $? = 2 ] && grep -q 'preset "drive it": no setting or parameter "trom"; did you mean "trim"' "$work/log" && [ ! -e "$work/x.html" ]
 report 'an unknown name in a preset is refused, with the nearest one' $?

@@ -6,7 +6,7 @@
 
 /* The model file itself; the name of its table is changed, since a program can have only one pw_plugin. */
 #define pw_plugin scene_ezyroller
-#include "../../models/ezyroller.c"
+#include "../../models/vehicles/ezyroller.c"
 
 static pw_model *scene_build (const pw_plugin_table *table, va_list sets) {
   pw_error error = { 0 };

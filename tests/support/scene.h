@@ -24,7 +24,7 @@
   static const pw_plugin_table name##_table = SCENE_TABLE_WITH (name, list, sizeof (type)); \
   static void name##_with (pw_model *m, const type *p __attribute__ ((unused)))
 
-/* The table of models/ezyroller.c. */
+/* The table of models/vehicles/ezyroller.c. */
 extern const pw_plugin_table scene_ezyroller;
 
 /* A built model of a table, with parameters set: scene_model (&table, "m2", 0.1, "I2", 0.01, NULL). */
