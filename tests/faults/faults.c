@@ -14,6 +14,8 @@
 
 /* ---- Files ---- */
 
+enum { FAULTS_FILE = 1 << 21 /* more than the bytes of a page */ };
+
 static size_t faults_slurp (const char *folder, const char *name, char *text, size_t room) {
   FILE *f = fopen (check_text ("%s/%s", folder, name), "rb");
   if (f == NULL) return room; /* as no file has it */
@@ -35,7 +37,7 @@ static int faults_lines (const char *text) {
 }
 
 static int faults_whole (const char *o, const char *whole, const char *name) {
-  static char text[1 << 20], same[1 << 20];
+  static char text[FAULTS_FILE], same[FAULTS_FILE];
   pw_checkpoint c;
   size_t size = faults_slurp (o, name, text, sizeof text);
   if (faults_ends (name, ".part")) return 1;
@@ -78,7 +80,7 @@ static void faults_empty (const char *folder) {
 }
 
 void faults_prepare (void) {
-  static char text[1 << 20];
+  static char text[FAULTS_FILE];
   char path[600];
   const char *o = cli_path ("o"), *start = cli_path ("start");
   faults_empty (o);
