@@ -5,7 +5,6 @@ import math
 import os
 import pathlib
 import sys
-import time
 import types
 import warnings
 
@@ -267,7 +266,7 @@ def test_clones_draw_the_same_numbers(roller):
         assert clone.random.uniform() == roller.random.uniform()
 
 
-# ---- Time and memory ----
+# ---- Memory ----
 
 def resident():
     return int(pathlib.Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -286,45 +285,6 @@ def test_resets_need_no_memory(roller):
         return resident()
     before = work(10_000)
     assert work(90_000) - before < 2e6  # 22 bytes for each, less than one allocation
-
-
-def fastest(function, count, repeat=7):
-    """Processor time of a call: the least of several means."""
-    def mean():
-        began = time.process_time()
-        for _ in range(count):
-            function()
-        return (time.process_time() - began) / count
-    return min(mean() for _ in range(repeat))
-
-
-def test_a_step_takes_microseconds(roller):
-    """Three times what a quiet machine needs for a step with a new input and six observations, 10 us."""
-    names, torque = tuple(roller.states[:6]), [0.1]
-
-    def control():
-        torque[0] = -torque[0]
-        roller.step(torque[0], 1e-3)
-        roller.observe(names)
-    assert fastest(control, 2000) < 30e-6
-
-
-def test_a_step_of_many_vehicles_takes_less():
-    """Three times 1.5 us for each."""
-    with pw.VectorSimulation("ezyroller", 256, "rk4+projection", inputs={"rider": 0.0}, specialise="always", threads=1) as vehicles:
-        torque = np.random.default_rng(0).uniform(-0.1, 0.1, (256, 1))
-
-        def control():
-            np.negative(torque, out=torque)
-            vehicles.step(torque, 1e-3)
-            vehicles.observe()
-        assert fastest(control, 50) / 256 < 4.5e-6
-
-
-def test_a_run_of_a_sweep_takes_little_besides_its_steps():
-    """Three times 60 us, of which most opens the run."""
-    model, vary = pw.Model("ezyroller"), {"frame.vx": np.linspace(0, 0.1, 500)}
-    assert fastest(lambda: model.sweep(vary, t_end=1e-3), 1) / 500 < 180e-6
 
 
 # ---- Many vehicles ----
