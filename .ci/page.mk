@@ -8,7 +8,7 @@ gallery: all
 # Only if the tools to compile it are installed; builds in $(BUILD)/variant do not need it.
 WASM_CC   ?= $(if $(findstring ccache,$(CC)),ccache )clang
 WASI      := $(if $(findstring /variant/,$(BUILD)),,$(and $(wildcard /usr/include/wasm32-wasi/stdio.h),$(wildcard /usr/lib/llvm-*/lib/clang/*/lib/wasi/libclang_rt.builtins-wasm32.a)))
-PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,pinwheel-page.objects pinwheel.wasm))
+PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,pinwheel-page.objects pinwheel.wasm.gz))
 
 all: $(PAGE)
 
@@ -37,3 +37,5 @@ $(BUILD)/page/pinwheel-page.objects: $(WASM_OBJ)
 # Missing functions are errors, except those in undefined.txt, which pages never call.
 $(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects core/cli/page/engine/undefined.txt
 	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined-file=core/cli/page/engine/undefined.txt,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
+$(BUILD)/page/pinwheel.wasm.gz: $(BUILD)/page/pinwheel.wasm
+	$(Q)gzip -9nc $< > $@

@@ -296,6 +296,15 @@ static void build_defer (sigset_t *mask) {
   pthread_sigmask (SIG_BLOCK, &stop, mask);
 }
 
+/* Compresses an object; without gzip it stays as it is. */
+static void build_pack (const build_command *cmd, const char *source, char *object) {
+  char packed[PW_PATH];
+  pw_error none = { 0 };
+  if (build_run (cmd, (char *[]){ "gzip", "-9n", object, NULL }, source, pw_path (packed, "%s.gz", object), &none) ==
+      PW_OK)
+    rename (packed, object);
+}
+
 /* What is done with the compiled object at a path; it is deleted afterwards. */
 typedef int build_user (void *context, const char *object, pw_error *error);
 
@@ -321,6 +330,7 @@ static int build_file (const char *path, const char *engine, build_user *use, vo
   int status = temporary_folder (folder, error);
   if (status == PW_OK) {
     status = build_object (&cmd, path, pw_path (object, "%s/object", folder), error);
+    if (status == PW_OK && engine) build_pack (&cmd, path, object);
     if (status == PW_OK) status = use (context, object, error);
     unlink (object);
     rmdir (folder);
@@ -523,7 +533,7 @@ int pw_file_list (int (*each) (void *context, const char *name, const char *path
   return status;
 }
 
-/* ---- Interactive pages: the engine as WebAssembly; for a text model also its text, tree and tables ---- */
+/* ---- Interactive pages: the engine as WebAssembly, packed by gzip; for a text model also its text, tree and tables ---- */
 
 enum { PAGE_MAX_BYTES = 64 << 20 };
 
@@ -558,7 +568,7 @@ static int page_use_engine (void *context, const char *object, pw_error *error) 
 static int page_engine (pw_page *p, const char *source, pw_error *error) {
   static const char *const where[] = { "page", "../page", "../lib/pinwheel/page", "page", "../page", "pinwheel/page" };
   char path[PW_PATH];
-  int status = search_file (where, source ? "pinwheel-page.objects" : "pinwheel.wasm", path, error);
+  int status = search_file (where, source ? "pinwheel-page.objects" : "pinwheel.wasm.gz", path, error);
   if (status == PW_OK && *path == 0)
     status = pw_fail (error, PW_INPUT,
                       "this Pinwheel was built without the engine of interactive pages: install %s and build it again",
