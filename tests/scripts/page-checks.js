@@ -103,6 +103,7 @@ async function checkLesson (change, until) {
   $("page-keep").click();
   const before = csv().split("\n"), first = families().length;
   await change("#page-method", "radau+ggl", "change");
+  demand("B is not named by its step: " + $("page-kept").textContent, /^B: rk4\+none, step size = 0.0316/.test($("page-kept").textContent));
   demand("no differences: " + families(), $("which").value.startsWith("distance of A and B") && families().length === first);
   const rows = [before, csv().split("\n")].map(lines => lines[lines.length - 2].split(",").map(Number));
   choose("which", "distance of A and B");
@@ -126,6 +127,8 @@ async function checkLesson (change, until) {
   $("page-step-size").dispatchEvent(new Event("input", { bubbles: true }));
   seek(0.52);
   await until("a step", () => oneStep && oneStep.h === 0.05 && !stepping);
+  demand("the step size in words: " + $("page-step-size").getAttribute("aria-valuetext"), $("page-step-size").getAttribute("aria-valuetext") === "0.05 s");
+  demand("the view is not near the step", state.follow);
   const h = 0.05, m = oneStep.motion, at = (i, k) => m[6 * i * bodies + k];
   demand("a step from " + oneStep.t[0], Math.abs(oneStep.t[0] - 0.5) < 1e-9 && Math.abs(oneStep.t[4] - 0.55) < 1e-9);
   for (let b = 0; b < bodies; b++)
@@ -145,6 +148,9 @@ async function checkLesson (change, until) {
     root.simulated = "";
     button.click();
     await until("the run of " + button.textContent, () => root.simulated === "yes");
+    const shown = { ...view };
+    fit();
+    demand("the view is not that of the new motion", shown.scale === view.scale);
     demand("its settings are not in the address", location.hash.length > 1 && $("page-preset").textContent === button.title);
   }
   demand("the model offers no runs", $("page-presets").children.length > 0);

@@ -23,7 +23,8 @@ li { border: 1px solid #8886; border-radius: 8px; overflow: hidden; }
 li a { display: block; padding: 0 .8rem .8rem; color: inherit; text-decoration: none; height: 100%; }
 li a:hover strong, li a:focus-visible strong { text-decoration: underline; }
 img { width: calc(100% + 1.6rem); height: 11rem; margin: 0 -.8rem .5rem; object-fit: contain; background: #fff; display: block; }
-strong { display: block; }
+strong, span { display: block; }
+span::first-letter { text-transform: uppercase; }
 </style>
 </head>
 <body>
@@ -37,7 +38,7 @@ END
     picture=$figures/gallery-$name.png
     [ -f "$picture" ] || picture=$figures/$name-mechanism.png
     cp "$picture" "$site/$name.png"
-    echo "<li><a href=\"$name.html\"><img src=\"$name.png\" alt=\"\" loading=\"lazy\"><strong>$name</strong>${about#*: }</a></li>"
+    echo "<li><a href=\"$name.html\"><img src=\"$name.png\" alt=\"\" loading=\"lazy\"><strong>$name</strong><span>${about#*: }</span></a></li>"
   done
   echo '</ul>'
   echo '</body>'

@@ -338,7 +338,7 @@ function fillPresets () {
     const button = Object.assign(document.createElement("button"), { type: "button", textContent: name, title: about });
     const link = new URLSearchParams(settings.split(" ").map(word => word.split("=")).map(([key, value]) =>
       [["step", "rtol"].includes(key) ? "accuracy" : key, value]));
-    button.addEventListener("click", () => { $("page-preset").textContent = about; use(link.toString()); });
+    button.addEventListener("click", () => { $("page-preset").textContent = about; use(link.toString(), true); });
     return button;
   }));
 }
@@ -351,7 +351,13 @@ function fillAccuracy () {
   $("page-accuracy").max = adaptive ? -2 : Math.min(-1, power(page.t_end) - 1);
   $("page-accuracy").step = adaptive ? 0.5 : 0.25;
   $("page-accuracy").value = Math.log10(accuracy(settings));
-  $("page-accuracy-value").textContent = rounded(accuracy(settings));
+  showAccuracy();
+}
+/* The sliders are logarithmic: their values in words. */
+function showAccuracy () { showValue("page-accuracy", rounded(accuracy(settings))); }
+function showValue (slider, text) {
+  $(slider + "-value").textContent = text;
+  $(slider).setAttribute("aria-valuetext", text);
 }
 
 /* ---- Runs ---- */
@@ -366,6 +372,7 @@ function difference (a, b) {
 
 /* Runs with the settings of the panel, and again if they have changed meanwhile. */
 let changes = 0; /* of settings */
+let refit = false; /* the next run changes the view */
 let simulating = false, estimateTimer = 0;
 async function simulate () {
   if (!engine) return; /* not yet */
@@ -398,7 +405,7 @@ async function showRun (change) {
   }
   const t = state.t;
   oneStep = null; /* of other settings */
-  if (run) { load(result); fillFamilies(); key(); seek(t); } else begin(result);
+  if (run) { load(result); if (refit) fit(); refit = false; fillFamilies(); key(); seek(t); } else begin(result);
   showCost(result, result.reason ? undefined : null);
   showValues();
   if (change !== changes) return;
@@ -456,7 +463,8 @@ function curvesOfRuns () {
 function fillTable (id, list) {
   $(id).replaceChildren(...list.map(([name, value]) => {
     const row = document.createElement("tr");
-    for (const text of [name, value]) row.append(Object.assign(document.createElement("td"), { textContent: text }));
+    row.append(Object.assign(document.createElement("th"), { scope: "row", textContent: name }),
+      Object.assign(document.createElement("td"), { textContent: value }));
     return row;
   }));
 }
@@ -545,7 +553,8 @@ function fillRunKey (curves) {
 
 let kept = null; /* B: a run and its settings as `link`; null: none */
 
-const nameOf = (method, link) => [method, link.replace(/&?method=[^&]*/, "").replace(/^&/, "").replaceAll("&", ", ")].filter(Boolean).join(", ");
+const nameOf = (method, link) => [method, ...[...new URLSearchParams(link)].filter(([key]) => key !== "method").map(([key, value]) =>
+  (key !== "accuracy" ? key : byName(method).adaptive ? "tolerance" : "step size") + " = " + value)].join(", ");
 /* B has the same bodies: with other counts in the model they cannot be compared. */
 const comparable = () => kept && kept.motion.length / kept.t.length === run.motion.length / run.t.length;
 
@@ -681,8 +690,9 @@ function readLink (text) {
   page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
 }
 
-/* Simulates with the settings of an address. */
-function use (text) {
+/* Simulates with the settings of an address; fits: whether the view then shows the whole motion. */
+function use (text, fits = false) {
+  refit = fits;
   readLink(text);
   fillPanel();
   simulate();
@@ -698,7 +708,7 @@ function csv () {
   return lines.join("\n") + "\n";
 }
 
-function showStepSize () { $("page-step-value").textContent = number(stepSize(), stepSize() / 100) + " s"; }
+function showStepSize () { showValue("page-step-size", number(stepSize(), stepSize() / 100) + " s"); }
 
 function addListeners () {
   $("page-step-size").min = Math.floor(Math.log10(page.t_end)) - 6;
@@ -708,12 +718,12 @@ function addListeners () {
   $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); simulate(); });
   $("page-accuracy").addEventListener("input", e => {
     settings.accuracy = Number(Math.pow(10, Number(e.target.value)).toPrecision(3));
-    $("page-accuracy-value").textContent = rounded(settings.accuracy);
+    showAccuracy();
     simulate();
   });
   $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); simulate(); } });
   $("panel").addEventListener("change", setAddress);
-  $("page-reset").addEventListener("click", () => { runs = []; use(""); });
+  $("page-reset").addEventListener("click", () => { runs = []; use("", true); });
   $("page-clear").addEventListener("click", () => { runs = []; plotRuns(); });
   $("page-csv").addEventListener("click", () => save(page.name + ".csv", new Blob([csv()], { type: "text/csv" })));
   $("page-link").addEventListener("click", async () => {
@@ -730,7 +740,7 @@ function addListeners () {
   $("page-step").addEventListener("click", () => {
     $("page-step").setAttribute("aria-pressed", !stepOn());
     $("page-step-box").hidden = !stepOn();
-    draw();
+    if (stepOn() && !state.follow) $("follow").click(); else draw(); /* a step is small beside the whole motion */
   });
   $("page-step-size").addEventListener("input", () => { showStepSize(); draw(); });
   $("page-step-next").addEventListener("click", () => seek(oneStep ? oneStep.t[4] : state.t + stepSize()));
