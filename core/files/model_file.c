@@ -533,7 +533,7 @@ int pw_file_list (int (*each) (void *context, const char *name, const char *path
   return status;
 }
 
-/* ---- Interactive pages: the engine as WebAssembly, packed by gzip; for a text model also its text, tree, tables ---- */
+/* ---- Interactive pages: the engine, packed by gzip; for a text model also its text, tree and tables ---- */
 
 enum { PAGE_MAX_BYTES = 64 << 20 };
 
