@@ -233,7 +233,7 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
                                ? "; with decimal commas, separate cells by semicolons or tabs"
                                : "");
     for (int k = 0; k < c->columns; k++)
-      if (columns_number (c, c->source[k], k || c->gaps == PW_GAPLESS ? c->gaps : PW_GAPS_REFUSED,
+      if (columns_number (c, c->source[k], k == 0 && c->increases ? PW_GAPS_REFUSED : c->gaps,
                           &value[(size_t)k * room + (size_t)n]) != PW_OK)
         return PW_INPUT;
     if (c->increases && value[n] <= last)

@@ -144,7 +144,7 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
 /* Reads columns of a table by their names or numbers ("1", ...), in SI units: `unit` of each, or NULL for any.  The
- * first one increases if it is the time, in "s".  Empty cells are gaps, NaN, in the time too; so is nan in the others.
+ * first one increases if it is the time, in "s".  Empty cells are gaps, NaN, in the time too; nan is one in the others.
  * Returns `width` arrays of *rows numbers (0 if the table has only names), one after the other; free it.  Columns after
  * the first one may be missing if `missing` is not NULL: it receives 1 for each of those, which have no array, else 0.
  * NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */

@@ -340,6 +340,57 @@ TEST (bound) {
   assert_true (0.3495 <= c && c <= 0.35);
 }
 
+/* ---- Outputs ---- */
+
+/* A ball that falls from y meets the ground at t1 = sqrt (2 y / g), then after 2 e t1, 2 e^2 t1, ... */
+TEST (events) {
+  const double g = 9.81, y = 1.2, e = 0.7, t1 = sqrt (2 * y / g), sigma = 1e-3;
+  cli_write ("ball.yaml", "pinwheel: 1\nparameters: [{name: bounce, value: 0.8, domain: fraction}]\n"
+                          "bodies: [{name: b, mass: 1, inertia: 1, start: {y: 1}}]\n"
+                          "elements:\n  - {gravity: g, acceleration: [0, -9.81]}\n"
+                          "  - {stop: S, body: [b, ground], what: y, low: 0, restitution: bounce}\n");
+  cli_write ("times.csv",
+             check_text ("event:S [ms],event 2:S,event 3:S,max:b.y\n%.12g,%.12g,%.12g,%.12g\n%.12g,,nan,\n", 1e3 * t1,
+                         t1 * (1 + 2 * e), t1 * (1 + 2 * e + 2 * e * e), y, 1e3 * t1));
+  /* on another clock, which counts ms from -5 s on; values along the run in the same table, one of which has no time */
+  cli_write ("clock.csv", check_text ("event 2:S,t,b.y\n%.12g,5200,%.12g\n,,7\n,5300,%.12g\n",
+                                      1e3 * (5 + t1 * (1 + 2 * e)), y - g / 2 * 0.04, y - g / 2 * 0.09));
+#define EVENTS "pinwheel fit @/ball.yaml --free b.y=0.5:2 --json @/fit.json "
+  static const char *const way[] = {
+    "--free bounce=0.1:0.95 --data @/times.csv --columns 'event:S,event 2:S,event 3:S'",
+    "--set bounce=0.7 --data @/times.csv --columns 'max:b.y,event 3:S - event 2:S' "
+    "--sigma max:b.y=1 --sigma 'event 3:S - event 2:S=1'",
+    "--free bounce=0.1:0.95 --data @/clock.csv --columns 'event 2:S,b.y' --time-scale 1e-3 "
+    "--time-offset -5 --sigma b.y=1 --sigma 'event 2:S=1'"
+  };
+  cli_shell ("sed -i '1s/$/,event 3:S - event 2:S/; 2s/$/,0.4847/; 3s/$/,/' @/times.csv");
+  for (int i = 0; i < 3; i++) {
+    cli_shell (check_text (EVENTS "%s -o @/fit.csv", way[i]));
+    check_close ("height", fit_value (cli_file ("fit.json"), "b.y", "value"), y, i == 1 ? 1e-4 : 1e-8,
+                 "the digits of the data");
+    if (i != 1) check_close ("restitution", fit_value (cli_file ("fit.json"), "bounce", "value"), e, 1e-8, "the same");
+  }
+  assert_non_null (strstr (cli_err, "left out are 0 empty cells, 1 row without a time, 0 rows after --t-end\n"));
+  assert_non_null (strstr (cli_file ("fit.csv"), "\nnan,nan,nan,nan,nan,nan,nan,nan,nan\n"));
+  cli_shell (EVENTS "--data @/times.csv --columns event:S --sigma event:S=1e-3");
+  check_close ("its error", fit_value (cli_file ("fit.json"), "b.y", "standard_error"), g * t1 * sigma / sqrt (2),
+               1e-6 * g * t1 * sigma, "differences");
+  static const cli_wrong wrong[] = {
+    { "--columns events:S", "--columns events:S: a number of events does not change gradually; compare the times of "
+                            "events, event:NAME and event N:NAME" },
+    { "--columns event:T", "--columns event:T: no element or reaction with a limit \"T\"; valid is S" },
+    { "--columns 'event 3:S' --t-end 1",
+      "--data @/times.csv: event 3:S at 1.67181346 s is after the run, which ends at 1 s: give --t-end" },
+    { "--columns event:S --plots @/p", "--plots: a figure has curves over time, and none of --columns is one" },
+  };
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+    cli_bad (check_text ("pinwheel fit @/ball.yaml --free b.y --data @/times.csv %s", wrong[i].arguments), 2,
+             wrong[i].message);
+  cli_bad ("pinwheel fit @/ball.yaml --free b.y --data @/times.csv --columns 'event 3:S' --start b.y=20 "
+           "--t-end 1.7",
+           4, "--columns event 3:S: there is no such event in the run to 1.7 s");
+}
+
 /* ---- Wrong input ---- */
 
 /* Times of data in ms without a unit, since an epoch, in a column of another name, with decimal commas. */
@@ -389,7 +440,7 @@ TEST (bad) {
       "nothing to compare: add --columns NAME,..., columns of the data such as frame.x" },
     { "@/wheel.yaml --data @/data.csv --columns w.phi", "nothing is free: add --free NAME or --free NAME=LOW:HIGH" },
     { "@/wheel.yaml --data @/data.csv --columns w.phj --free k",
-      "--columns: no column \"w.phj\"; did you mean \"w.phi\"?" },
+      "--columns w.phj: no column \"w.phj\"; did you mean \"w.phi\"?" },
     { "@/wheel.yaml --data @/data.csv --columns w.omega --free k",
       "@/data.csv:1: there is no column \"w.omega\"; valid are t, w.phi, error" },
     { "@/wheel.yaml --data @/data.csv --columns w.phi,w.phi --free k", "--columns: w.phi is given twice" },

@@ -3,7 +3,7 @@
 # be in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line depends on the machine:
 # times, and results of a drifting method at a singular configuration.
 # Tables of options are those that core/cli/options.sh makes.
-# A YAML block after "save as `NAME`:" becomes a file for the commands after it.  Run from the top folder; reads PINWHEEL.
+# A YAML or CSV block after "save as `NAME`:" becomes a file for the commands after it.  Run from the top folder; reads PINWHEEL.
 
 . "$(dirname "$0")/../support/report.sh"
 
@@ -14,13 +14,13 @@ blocks () {
        shown && NF { print substr ($0, 5) }' "$1"
 }
 
-# files FILE: writes the YAML blocks that a page names, in $work.
+# files FILE: writes the YAML and CSV blocks that a page names, in $work.
 files () {
   awk -v work="$work" '
     /[Ss]ave as `[^`]*`:$/ { name = $0; sub (/.*[Ss]ave as `/, "", name); sub (/`:$/, "", name) }
     /^```$/ && writing { close (work "/" name); writing = 0; name = "" }
     writing { print > (work "/" name) }
-    /^```yaml$/ && name != "" { writing = 1 }' "$1"
+    /^```(yaml|csv)$/ && name != "" { writing = 1 }' "$1"
 }
 
 # missing FILE: the first line of standard input that is not in the file, after the lines before it; "..." is skipped.

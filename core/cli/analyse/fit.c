@@ -15,6 +15,10 @@
 /* A least-squares fit for `pinwheel fit`: its options, data and results.  Comments on arrays begin with their sizes;
  * arrays "columns x rows" have the rows of the first column, then those of the second one, ... */
 
+/* What a column is compared with: the values along the run, at the times of its rows; or, in each row, a number that
+ * the run yields, the time of an event or another one. */
+typedef enum { FIT_ALONG, FIT_EVENT, FIT_NUMBER } fit_kind;
+
 typedef struct {
   pw_cli_line line;
   const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *confidence_text, *starts_text,
@@ -25,12 +29,14 @@ typedef struct {
   int jobs, starts;
   /* data */
   const char **column_name, **column_unit; /* columns, ended by NULL */
+  fit_kind *column_kind;                   /* columns */
   double *table;                           /* times, data, columns of standard deviations */
   int columns, rows;                       /* of the data */
+  int timed;                               /* rows with a time, which come first; the others have outputs alone */
   int untimed, late;                       /* rows that are left out: without a time, after --t-end */
   double first, last;                      /* times in the table, those after --t-end included [s] */
   double t_end;                            /* of the run of the model, or --t-end [s] */
-  const double *t;                         /* rows [s] */
+  const double *t;                         /* timed [s] */
   const double *data;                      /* columns x rows; NaN: none */
   double *sigma;                           /* columns x rows: standard deviations; 1 if not weighted */
   int weighted;                            /* 1: standard deviations are given */
@@ -75,27 +81,57 @@ typedef struct {
   double number;    /* NaN: the text is the name of a column of the table */
 } fit_sigma;
 
-/* Splits "NAME,..." of --columns. */
-static int data_read_columns (pw_fit *fit, pw_error *error) {
+/* Splits "NAME,..." of --columns; commas in parentheses belong to a name. */
+static int data_split_columns (pw_fit *fit, pw_error *error) {
   size_t count = 2; /* one name more than commas, and NULL at the end */
   for (const char *text = fit->columns_text; *text; text++) count += *text == ',';
   char *name = pw_arena_copy (&fit->line.arena, fit->columns_text);
   fit->column_name = pw_arena_alloc (&fit->line.arena, 2 * count * sizeof *fit->column_name);
-  if (name == NULL || fit->column_name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  fit->column_kind = pw_arena_alloc (&fit->line.arena, count * sizeof *fit->column_kind);
+  if (name == NULL || fit->column_name == NULL || fit->column_kind == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
   fit->column_unit = fit->column_name + count;
-  while (name) {
-    char *comma = strchr (name, ',');
-    pw_column column;
-    if (comma) *comma = 0;
-    if (pw_column_find (fit->line.m.system, name, "--columns", &column, error) != PW_OK) return error->status;
-    for (int i = 0; i < fit->columns; i++)
-      if (strcmp (fit->column_name[i], name) == 0)
-        return pw_fail (error, PW_INPUT, "--columns: %s is given twice", name);
-    fit->column_unit[fit->columns] = pw_system_column_unit (fit->line.m.system, column);
+  for (int more = 1; more; name++) {
     fit->column_name[fit->columns++] = name;
-    name = comma ? comma + 1 : NULL;
+    name += pw_cli_part (name, ',');
+    more = *name;
+    *name = 0;
+    for (int i = 0; i < fit->columns - 1; i++)
+      if (strcmp (fit->column_name[i], fit->column_name[fit->columns - 1]) == 0)
+        return pw_fail (error, PW_INPUT, "--columns: %s is given twice", fit->column_name[i]);
   }
   return PW_OK;
+}
+
+/* Reads --columns: outputs, of which columns of `run`, and functions of these, are values along the run. */
+static int data_read_columns (pw_fit *fit, pw_error *error) {
+  pw_outcomes set = { .system = NULL };
+  char unit[PW_NAME_BYTES];
+  int status = data_split_columns (fit, error);
+  if (status == PW_OK)
+    status = pw_outcomes_open (&set, fit->line.m.system, "--columns", fit->column_name, fit->columns, NULL, error);
+  for (int i = 0; i < fit->columns && status == PW_OK; i++) {
+    const pw_outcome *o = set.outcome + i;
+    const int is_event = o->formula == NULL && set.functional[o->term[0]].type == PW_EVENT;
+    fit->column_kind[i] = pw_outcome_is_final (&set, i) ? FIT_ALONG : is_event ? FIT_EVENT : FIT_NUMBER;
+    fit->column_unit[i] = pw_arena_copy (&fit->line.arena, pw_outcome_unit (&set, i, unit, sizeof unit));
+    if (fit->column_unit[i] == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
+    for (int k = 0; k < o->terms; k++)
+      if (set.functional[o->term[k]].type == PW_EVENTS)
+        status = pw_fail (error, PW_INPUT,
+                          "--columns %s: a number of events does not change gradually; compare the times of events, "
+                          "event:NAME and event N:NAME",
+                          o->text);
+  }
+  pw_outcomes_close (&set);
+  return status;
+}
+
+/* The number of columns that are values along the run. */
+static int data_along (const pw_fit *fit) {
+  int count = 0;
+  for (int i = 0; i < fit->columns; i++) count += fit->column_kind[i] == FIT_ALONG;
+  return count;
 }
 
 /* Reads "COLUMN=VALUE" or "COLUMN=NAME" of --sigma. */
@@ -152,55 +188,93 @@ static int data_check_times (const pw_fit *fit, pw_error *error) {
 /* Reports which part of the run the data cover, and what is not used. */
 static void data_report (const pw_fit *fit) {
   const double t_end = fit->t_end, covered = fmin (fit->last, t_end) - fit->first;
-  const int empty = fit->columns * fit->rows - fit->residuals;
+  int empty = 0;
+  if (fit->timed == 0) return;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    empty += fit->column_kind[i / fit->rows] == FIT_ALONG && i % fit->rows < fit->timed && isnan (fit->data[i]);
   if (covered < 0.9 * t_end || (fit->last > t_end * (1 + 1e-9) && fit->line.t_end == NULL))
     pw_cli_say ("pinwheel: " FIT_TIMES " cover %.3g %% of the run, which ends at %.6g s%s\n", fit->data_path,
                 fit->first, fit->last, 100 * covered / t_end, t_end,
-                fit->line.t_end ? "" : "; runs end at the last datum");
+                fit->line.t_end || data_along (fit) < fit->columns ? "" : "; runs end at the last datum");
   if (empty || fit->untimed || fit->late)
     pw_cli_say ("pinwheel: --data %s: left out are %s, %s without a time, %s after --t-end\n", fit->data_path,
                 PW_COUNTED (empty, "empty cell"), PW_COUNTED (fit->untimed, "row"), PW_COUNTED (fit->late, "row"));
 }
 
-/* Converts the times to seconds, and copies the rows of the table that have one, up to --t-end. */
-static int data_keep_rows (pw_fit *fit, double *table, int columns, pw_error *error) {
-  const double t_end = fit->line.t_end ? fit->t_end * (1 + 1e-9) : INFINITY;
+/* Converts times, those of events too, to seconds.  `event`: columns of the table with these, or their deviations. */
+static int data_convert_times (pw_fit *fit, double *table, const unsigned char *time, int columns, pw_error *error) {
   double scale = 1, offset = 0;
-  int rows = fit->rows, kept = 0, timed = 0;
-  fit->table = pw_arena_alloc (&fit->line.arena, (size_t)columns * (size_t)rows * sizeof *table);
-  if (fit->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (pw_cli_number ("--time-scale", fit->time_scale_text, PW_POSITIVE, &scale, error) != PW_OK ||
       pw_cli_number ("--time-offset", fit->time_offset_text, PW_REAL, &offset, error) != PW_OK)
     return error->status;
-  for (int i = 0; i < rows; i++) {
-    table[i] = scale * (table[i] + offset / scale);
-    kept += table[i] <= t_end;
-    if (isnan (table[i])) continue;
-    if (timed++ == 0) fit->first = table[i];
-    fit->last = table[i];
+  for (int i = 0; i < columns * fit->rows; i++) {
+    const int column = i / fit->rows;
+    if (time[column]) table[i] = scale * (table[i] + (column > fit->columns ? 0 : offset / scale));
   }
-  for (int i = 0, k = 0; i < rows; i++) {
-    if (!(table[i] <= t_end)) continue;
-    for (int j = 0; j < columns; j++) fit->table[j * kept + k] = table[j * rows + i];
-    k++;
-  }
-  fit->rows = kept, fit->untimed = rows - timed, fit->late = timed - kept;
-  return timed ? data_check_times (fit, error) : pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
+  return PW_OK;
 }
 
-/* Reads times, data, and columns of standard deviations. */
+/* Whether column j of the table, or of its row i a datum, is along the run. */
+static int data_is_along (const pw_fit *fit, int j) {
+  return j > 0 && j <= fit->columns && fit->column_kind[j - 1] == FIT_ALONG;
+}
+static int data_row_is_along (const pw_fit *fit, const double *table, int i) {
+  int found = 0;
+  for (int j = 1; j <= fit->columns; j++) found |= data_is_along (fit, j) && !isnan (table[j * fit->rows + i]);
+  return found;
+}
+
+/* Copies the rows of the table that have a time, up to --t-end; after them, if there are outputs, the others without
+ * time and data along the run. */
+static int data_keep_rows (pw_fit *fit, const double *table, int columns, pw_error *error) {
+  const double t_end = fit->line.t_end ? fit->t_end * (1 + 1e-9) : INFINITY;
+  const int rows = fit->rows, along = data_along (fit), outputs = along < fit->columns;
+  int with_time = 0;
+  fit->table = pw_arena_alloc (&fit->line.arena, (size_t)columns * (size_t)rows * sizeof *table);
+  if (fit->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < rows; i++) {
+    if (table[i] <= t_end)
+      fit->timed++;
+    else if (!outputs || data_row_is_along (fit, table, i))
+      ++*(isnan (table[i]) ? &fit->untimed : &fit->late);
+    if (isnan (table[i])) continue;
+    if (with_time++ == 0) fit->first = table[i];
+    fit->last = table[i];
+  }
+  if (outputs == 0) fit->rows = fit->timed;
+  for (int i = 0, next[2] = { 0, fit->timed }; i < rows; i++) {
+    const int other = !(table[i] <= t_end);
+    if (other && !outputs) continue;
+    double *to = fit->table + next[other]++;
+    for (int j = 0; j < columns; j++)
+      to[j * fit->rows] = other && (j == 0 || data_is_along (fit, j)) ? NAN : table[j * rows + i];
+  }
+  if (rows == 0 || (along && with_time == 0)) return pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
+  return along ? data_check_times (fit, error) : PW_OK;
+}
+
+/* Reads times, data, and columns of standard deviations.  Outputs alone need no times. */
 static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error) {
   const size_t most = 1 + 2 * (size_t)fit->columns;
   const char **column = pw_arena_alloc (&fit->line.arena, 2 * most * sizeof *column);
+  unsigned char *time = pw_arena_alloc (&fit->line.arena, most);
+  const int along = data_along (fit);
   int count = 1;
-  if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (column == NULL || time == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const char **unit = column + most;
-  column[0] = fit->time_name ? fit->time_name : "t", unit[0] = "s";
-  for (int i = 0; i < fit->columns; i++) column[count] = fit->column_name[i], unit[count++] = fit->column_unit[i];
+  column[0] = !along ? fit->column_name[0] : fit->time_name ? fit->time_name : "t", unit[0] = along ? "s" : NULL;
+  time[0] = 1;
+  for (int i = 0; i < fit->columns; i++, count++) {
+    column[count] = fit->column_name[i], unit[count] = fit->column_unit[i];
+    time[count] = fit->column_kind[i] == FIT_EVENT;
+  }
   for (int i = 0; i < fit->columns; i++)
-    if (isnan (given[i].number)) column[count] = given[i].text, unit[count++] = fit->column_unit[i];
+    if (isnan (given[i].number))
+      column[count] = given[i].text, time[count] = time[1 + i], unit[count++] = fit->column_unit[i];
   double *table = pw_read_columns (fit->data_path, column, unit, count, NULL, &fit->rows, error);
-  int status = table ? data_keep_rows (fit, table, count, error) : error->status;
+  int status = table ? data_convert_times (fit, table, time, count, error) : error->status;
+  for (int i = 0; i < fit->rows && status == PW_OK && !along; i++) table[i] = NAN;
+  if (status == PW_OK) status = data_keep_rows (fit, table, count, error);
   free (table);
   return status;
 }
@@ -226,9 +300,12 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
     if (isnan (fit->data[i])) continue;
     fit->residuals++;
     if (!(fit->sigma[i] > 0))
-      return pw_fail (error, PW_INPUT,
-                      "--data %s: the standard deviation of %s at t = %g s is %g; expected a number > 0",
-                      fit->data_path, fit->column_name[i / rows], fit->t[i % rows], fit->sigma[i]);
+      return pw_fail (error, PW_INPUT, "--data %s: the standard deviation of %s%s is %g; expected a number > 0",
+                      fit->data_path, fit->column_name[i / rows],
+                      i % rows < fit->timed ? PW_PRINTED (40, " at t = %g s", fit->t[i % rows]) : "", fit->sigma[i]);
+    if (fit->column_kind[i / rows] == FIT_EVENT && fit->data[i] > fit->t_end)
+      return pw_fail (error, PW_INPUT, "--data %s: %s at %.9g s is after the run, which ends at %.6g s: give --t-end",
+                      fit->data_path, fit->column_name[i / rows], fit->data[i], fit->t_end);
   }
   return PW_OK;
 }
@@ -238,17 +315,33 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
 #define FIT_RTOL 1e-8 /* largest relative tolerance of runs that are compared */
 
 /* Runs the model with these values of the unknowns, with its own settings, or if rtol > 0 with this tolerance; out:
- * columns x rows.  A status; PW_RETRY after Ctrl-C. */
+ * columns x rows, 0 where a row has no datum of an output.  A status; PW_RETRY after Ctrl-C. */
 static int fit_run (const pw_fit *fit, const double *unknowns, double rtol, double *out, pw_error *error) {
+  const size_t columns = (size_t)fit->columns, timed = (size_t)fit->timed;
+  double *value = malloc (columns * (1 + timed) * sizeof *value), *along = value + columns;
   const pw_run_outputs outputs = { .unknowns = &fit->unknowns,
                                    .method = rtol > 0 ? fit->unknowns.method : NULL,
                                    .rtol = rtol,
                                    .option = "--columns",
                                    .of = fit->column_name,
                                    .count = fit->columns,
-                                   .t = fit->t,
-                                   .rows = fit->rows };
-  return pw_run_outputs_at (&outputs, unknowns, NULL, out, error);
+                                   .t = fit->timed ? fit->t : NULL,
+                                   .rows = fit->timed };
+  int status = value ? pw_run_outputs_at (&outputs, unknowns, value, along, error)
+                     : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < fit->columns * fit->rows && status == PW_OK; i++) {
+    const int c = i / fit->rows, row = i % fit->rows, known = !isnan (fit->data[i]);
+    if (fit->column_kind[c] == FIT_ALONG)
+      out[i] = row < fit->timed ? along[c * fit->timed + row] : 0;
+    else
+      out[i] = known ? value[c] : 0;
+    if (known && isnan (out[i]))
+      status = pw_fail (error, PW_METHOD, "--columns %s: %s in the run to %.6g s", fit->column_name[c],
+                        fit->column_kind[c] == FIT_EVENT ? "there is no such event" : "it has no value",
+                        fit->unknowns.settings.span);
+  }
+  free (value);
+  return status;
 }
 
 static int fit_own (void *fit, const double *x, double rtol, double *value, pw_error *error) {
@@ -845,17 +938,18 @@ static int fit_table (const void *context, FILE *f, pw_error *error) {
   const pw_fit *fit = context;
   static const char *const part[] = { "", ".model", ".residual", ".sigma" };
   pw_text t = { .chars = NULL };
-  pw_text_name (&t, "t", "s");
+  if (fit->timed) pw_text_name (&t, "t", "s");
   for (int i = 0; i < fit->columns; i++)
     for (int k = 0; k < 4; k++)
       pw_text_name (&t, PW_PRINTED (300, "%s%s", fit->column_name[i], part[k]), fit->column_unit[i]);
   int status = pw_text_line (&t, f, fit->table_path, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) {
-    pw_text_number (&t, fit->t[row]);
+    if (fit->timed) pw_text_number (&t, fit->t[row]);
     for (int i = 0; i < fit->columns; i++) {
-      int k = i * fit->rows + row;
-      const double value[] = { fit->data[k], fit->fitted[k], fit->fitted[k] - fit->data[k],
-                               fit->weighted ? fit->sigma[k] : NAN };
+      int k = i * fit->rows + row,
+          known = !isnan (fit->data[k]) || (fit->column_kind[i] == FIT_ALONG && row < fit->timed);
+      const double value[] = { fit->data[k], known ? fit->fitted[k] : NAN, fit->fitted[k] - fit->data[k],
+                               fit->weighted && known ? fit->sigma[k] : NAN };
       for (int c = 0; c < 4; c++) pw_text_number (&t, value[c]);
     }
     status = pw_text_line (&t, f, fit->table_path, error);
@@ -865,30 +959,32 @@ static int fit_table (const void *context, FILE *f, pw_error *error) {
 
 /* ---- The figure ---- */
 
-/* Data and model of each column, below them the residuals. */
+/* Data and model of each column along the run, below them the residuals. */
 static int fit_draw (const pw_fit *fit, pw_error *error) {
-  const int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS, several = panels > 1;
+  const int along = data_along (fit), several = along > 1;
   const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
   pw_curves c;
   int status = pw_curves_open (&c, &fit->line, fit->plots_path, "fit", "data and fitted model", error);
   if (status != PW_OK) return status;
-  for (int i = 0; i < panels; i++) {
+  for (int i = 0, panels = 0; i < fit->columns && panels < REPORT_PANELS; i++) {
+    if (fit->column_kind[i] != FIT_ALONG) continue;
+    panels++;
     const double *t = fit->t, *data = fit->data + i * fit->rows, *fitted = fit->fitted + i * fit->rows,
                  *sigma = fit->sigma + i * fit->rows;
     pw_panel panel = { .x_label = "t [s]",
                        .y_label = PW_FIGURE_LABEL (fit->column_name[i], fit->column_unit[i]),
-                       .x = { t[0], t[fit->rows - 1] },
+                       .x = { t[0], t[fit->timed - 1] },
                        .aspect = several ? 0.6 : 0.45,
                        .type = several ? PW_PANEL_HALF : 0 };
     pw_curves_panel (&c, &panel);
     pw_curves_add (&c, style, label);
-    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], data[k], sigma[k]);
+    for (int k = 0; k < fit->timed; k++) pw_curves_point (&c, t[k], data[k], sigma[k]);
     pw_curves_add (&c, "model", "model");
-    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], fitted[k], 0);
+    for (int k = 0; k < fit->timed; k++) pw_curves_point (&c, t[k], fitted[k], 0);
     panel.y_label = "residual", panel.type |= PW_PANEL_BELOW, panel.aspect *= 0.6;
     pw_curves_panel (&c, &panel);
     pw_curves_add (&c, style, label);
-    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], fitted[k] - data[k], sigma[k]);
+    for (int k = 0; k < fit->timed; k++) pw_curves_point (&c, t[k], fitted[k] - data[k], sigma[k]);
   }
   return pw_curves_draw (&c, PW_OK, error);
 }
@@ -933,7 +1029,11 @@ static int fit_open (pw_fit *fit, pw_error *error) {
   if (fit->residuals < fit->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
                     fit->residuals, fit->unknowns.count);
-  fit->unknowns.settings.span = fit->t[fit->rows - 1]; /* runs end at the time of the last row */
+  if (fit->plots_path && fit->timed == 0)
+    return pw_fail (error, PW_INPUT, "--plots: a figure has curves over time, and none of --columns is one");
+  /* runs end at the time of the last row, but those with outputs not before their final time */
+  const double last = fit->timed ? fit->t[fit->timed - 1] : 0;
+  fit->unknowns.settings.span = data_along (fit) == fit->columns ? last : fmax (last, fit->t_end);
   status = pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
   return status == PW_OK ? pw_files_open (&fit->line, use, sizeof use / sizeof *use, error) : status;
 }
@@ -979,7 +1079,10 @@ static const struct poptOption fit_options_table[] = {
   PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
   PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
   PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
-  PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
+  PW_TEXT_OPTION (
+      pw_fit, columns_text, "columns", 0, "NAME,...",
+      "Columns of the data to compare with the model: columns of `run`; or, in any row, other outputs of a run, such "
+      "as event:A, event 2:A, max:B.Fx"),
   PW_LIST_OPTION (
       pw_fit, free, "free", 0, "NAME[=LOW:HIGH[:log]]",
       "Determine a parameter or initial value, such as frame.vx, from the model's value on, within bounds or "

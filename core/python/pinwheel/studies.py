@@ -419,7 +419,7 @@ class Analyses:
         data : dict of arrays, DataFrame or path
             Times "t", and columns with the names of results; NaN: not measured.
         columns : str or list of str
-            The columns of the data to compare.
+            The columns of the data to compare; also numbers that a run yields, such as "event 2:floor", without times.
         free : dict, str or list of str
             Unknowns, with bounds: ``{"l": (0.5, 2)}``; None: without.
         sigma : dict, optional
