@@ -35,7 +35,7 @@ $(BUILD)/page/pinwheel-page.objects: $(WASM_OBJ)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
 # Missing functions are errors, except those in undefined.txt, which pages never call.
-$(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects core/cli/page/engine/undefined.txt
+$(BUILD)/wasm/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects core/cli/page/engine/undefined.txt
 	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined-file=core/cli/page/engine/undefined.txt,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
-$(BUILD)/page/pinwheel.wasm.gz: $(BUILD)/page/pinwheel.wasm
+$(BUILD)/page/pinwheel.wasm.gz: $(BUILD)/wasm/pinwheel.wasm
 	$(Q)gzip -9nc $< > $@

@@ -18,14 +18,14 @@ engine_tables () {
     $1 == "one step of rk4+projection" { $1 = scene ": specialised against general" }
     { sub(/, a step of rk4.projection, runs in lanes .right. against general$/, ": in lanes against general", $1)
       sub(/one step of rk4.projection$/, "a step", $1); sub(/one evaluation$/, "an evaluation", $1) }
+    $1 ~ /^(snakeboard|n-trailer|roller-racer|andrews-squeezer|wheeled-snake):/ { next } # the CSV has all scenes
     $2 ~ /^(evaluation|step|body)$/ {
       sub(/, one evaluation, per body$/, "", $1)
       printf "| %s | %s | %s | %s | %s |\n", $1 ($2 == "body" ? ", per body" : ""), short($3), short($4), short($5), ($6 > 0 && $7 > 0 ? sprintf("%.2f", $7 / $6) : "") }'
   echo
   echo '| growth with the number of bodies N | measured |'
   echo '|---|---|'
-  split | awk -F '\t' '$2 == "slope" || $2 == "s" || $1 == "memory per body, all of it" {
-    printf "| %s%s | %s |\n", $1, ($2 ~ /\// ? " [" $2 "]" : ""), ($5 != "" ? $5 : $4) }'
+  split | awk -F '\t' '$2 == "slope" { printf "| %s | %s |\n", $1, ($5 != "" ? $5 : $4) }'
 }
 
 engine_figure () {
