@@ -1,6 +1,8 @@
 """Models and results in Python: functions of states, contents, figures, options with names."""
 
+import inspect
 import math
+import re
 
 import numpy as np
 import pytest
@@ -143,6 +145,13 @@ def test_options_of_analyses_have_names(call, text):
         call(pw.Model("pendulum"))
 
 
+@pytest.mark.parametrize("name", ["check", "compare", "drift", "steady", "periodic", "sensitivity", "fit", "optimise"])
+def test_analyses_have_the_options_of_the_program(name):
+    """All but those of the model and of what is returned."""
+    options = {o.replace("-", "_") for o in re.findall(r"^ +(?:-\w, )?--([\w-]+)", pw.help_of(name), re.M)}
+    assert options - {"json", "set", "start", "max_file", "help", "table"} == set(inspect.signature(getattr(pw.Model, name)).parameters) - {"self"}
+
+
 def test_analyses_write_tables_and_figures(tmp_path):
     model = pw.Model("pendulum")
     compared = model.compare(t_end=0.5, methods="rk4", step_ladder="1e-2:1e-3", output=tmp_path / "c.csv")
@@ -159,7 +168,7 @@ def test_options_of_analyses_reach_the_command():
     assert best["unknowns"][0]["name"] == "theta"
     t = np.linspace(0, 1, 11)
     data = {"time": 1000 * t, "bob.x": pw.Model("pendulum", l=1.2).run(times=t)["bob.x"]}
-    found = model.fit(data, ["bob.x"], {"l": None}, time="time", time_scale=1e-3, sigma={"bob.x": 0.01}, confidence=0.9)
+    found = model.fit(data, ["bob.x"], {"l": (0.5, 2, "log")}, time="time", time_scale=1e-3, sigma={"bob.x": 0.01}, confidence=0.9)
     assert found["unknowns"][0]["value"] == pytest.approx(1.2, abs=1e-6)
     motions = pw.Model("n-trailer").steady(hold={"tractor.vx": 1.0}, starts=3)["motions"]
     assert motions

@@ -277,6 +277,7 @@ def help_of(name: str) -> str:
 # Parameters that several analyses have; a method's docstring describes the others.
 _COMMON = {
     "method": "str, optional\n    Integrator and stabilisation; default: the model's.",
+    "method_file": "path, optional\n    A method of your own, a file in C.",
     "t_end": "float, optional\n    Final time [s].",
     "step": "float, optional\n    Step size of methods with fixed steps [s].",
     "rtol": "float, optional\n    Relative tolerance of adaptive methods.",
@@ -291,6 +292,7 @@ _COMMON = {
     "methods": 'str or list of str, optional\n    Methods, "rk4+all".',
     "output": "path, optional\n    A table to write: .csv, .npz or .json.",
     "plots": "path, optional\n    A folder for figures.",
+    "width": 'str, optional\n    Width of figures, "85mm".',
 }
 _RETURNS = "dict\n    The command's JSON."
 _TABLE = "dict\n    Columns of the table: arrays of shape (rows,), with units in their names."
@@ -338,10 +340,10 @@ class Analyses:
         """Checks mobility, redundancy, initial conditions, derivatives and stability."""
 
     @_analysis
-    def compare(self, *, methods: _Names | None = None, t_end: float | None = None, limit: float | None = None,  # type: ignore[empty-body]
-                repeats: int | None = None, jobs: int | None = None, rtol_ladder: tuple | str | None = None,
-                step_ladder: tuple | str | None = None, reference: _Path | None = None, specialise: str | None = None,
-                output: _Path | None = None, plots: _Path | None = None) -> dict:
+    def compare(self, *, methods: _Names | None = None, method_file: _Path | None = None,  # type: ignore[empty-body]
+                t_end: float | None = None, limit: float | None = None, repeats: int | None = None, jobs: int | None = None,
+                rtol_ladder: tuple | str | None = None, step_ladder: tuple | str | None = None, reference: _Path | None = None,
+                specialise: str | None = None, output: _Path | None = None, plots: _Path | None = None, width: str | None = None) -> dict:
         """Compares the accuracy and cost of methods against a reference solution.
 
         repeats : int, optional
@@ -353,10 +355,11 @@ class Analyses:
         """
 
     @_analysis
-    def drift(self, *, methods: _Names | None = None, t_end: float | None = None, step: float | None = None,  # type: ignore[empty-body]
-              rtol: float | None = None, max_steps: int | None = None, limit: float | None = None, jobs: int | None = None,
-              vary: Mapping[str, Any] | None = None, only_methods: bool = False, specialise: str | None = None,
-              output: _Path | None = None, plots: _Path | None = None) -> dict:
+    def drift(self, *, methods: _Names | None = None, method_file: _Path | None = None,  # type: ignore[empty-body]
+              t_end: float | None = None, step: float | None = None, rtol: float | None = None, max_steps: int | None = None,
+              limit: float | None = None, jobs: int | None = None, vary: Mapping[str, Any] | None = None,
+              only_methods: bool = False, specialise: str | None = None, output: _Path | None = None,
+              plots: _Path | None = None, width: str | None = None) -> dict:
         """Compares the drift of constraints and energy in long runs, by stabilisation.
 
         vary : dict, optional
@@ -368,7 +371,7 @@ class Analyses:
     @_analysis
     def steady(self, *, hold: Mapping[str, float] | None = None, vary: Mapping[str, Any] | None = None,  # type: ignore[empty-body]
                starts: int | None = None, at: float | None = None, limit: float | None = None, output: _Path | None = None,
-               plots: _Path | None = None) -> dict:
+               plots: _Path | None = None, width: str | None = None) -> dict:
         """Finds steady motions, and follows them over a parameter or a held value.
 
         hold : dict, optional
@@ -378,9 +381,10 @@ class Analyses:
         """
 
     @_analysis
-    def periodic(self, *, period: float | str | None = None, periods: int | None = None, guess: float | None = None,  # type: ignore[empty-body]
-                 vary: Mapping[str, Any] | None = None, method: str | None = None, rtol: float | None = None,
-                 limit: float | None = None, output: _Path | None = None, plots: _Path | None = None) -> dict:
+    def periodic(self, *, period: float | str | None = None, periods: int | None = None,  # type: ignore[empty-body]
+                 guess: float | None = None, vary: Mapping[str, Any] | None = None, method: str | None = None,
+                 method_file: _Path | None = None, rtol: float | None = None, limit: float | None = None,
+                 output: _Path | None = None, plots: _Path | None = None, width: str | None = None) -> dict:
         """Finds periodic motions, and follows them over a parameter.
 
         period : float or "free", optional
@@ -392,11 +396,12 @@ class Analyses:
         """
 
     @_analysis
-    def sensitivity(self, of: _Names, by: _Names, *, every: float | None = None, until: str | None = None,  # type: ignore[empty-body]
-                    method: str | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
-                    atol: float | None = None, max_steps: int | None = None, limit: float | None = None,
-                    jobs: int | None = None, specialise: str | None = None, output: _Path | None = None,
-                    plots: _Path | None = None) -> dict:
+    def sensitivity(self, of: _Names, by: _Names, *, every: float | None = None,  # type: ignore[empty-body]
+                    until: str | None = None, method: str | None = None, method_file: _Path | None = None,
+                    t_end: float | None = None, step: float | None = None, rtol: float | None = None, atol: float | None = None,
+                    max_steps: int | None = None, limit: float | None = None, jobs: int | None = None,
+                    specialise: str | None = None, output: _Path | None = None, plots: _Path | None = None,
+                    width: str | None = None) -> dict:
         """Differentiates outputs of a run with respect to parameters and initial values.
 
         of : str or list of str
@@ -411,9 +416,9 @@ class Analyses:
     def fit(self, data, columns: _Names, free: _Free, *, sigma: Mapping[str, Any] | None = None,  # type: ignore[empty-body]
             confidence: float | None = None, starts: int | None = None, time: str | None = None,
             time_scale: float | None = None, time_offset: float | None = None, method: str | None = None,
-            t_end: float | None = None, step: float | None = None, rtol: float | None = None, atol: float | None = None,
-            max_steps: int | None = None, limit: float | None = None, jobs: int | None = None, specialise: str | None = None,
-            output: _Path | None = None, plots: _Path | None = None) -> dict:
+            method_file: _Path | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
+            atol: float | None = None, max_steps: int | None = None, limit: float | None = None, jobs: int | None = None,
+            specialise: str | None = None, output: _Path | None = None, plots: _Path | None = None, width: str | None = None) -> dict:
         """Fits parameters and initial values to measured data, up to t_end if that is given.
 
         data : dict of arrays, DataFrame or path
@@ -421,7 +426,7 @@ class Analyses:
         columns : str or list of str
             The columns of the data to compare; also numbers that a run yields, such as "event 2:floor", without times.
         free : dict, str or list of str
-            Unknowns, with bounds: ``{"l": (0.5, 2)}``; None: without.
+            Unknowns, with bounds: ``{"l": (0.5, 2)}`` or ``(0.5, 2, "log")``; None: without.
         sigma : dict, optional
             Standard deviations of columns: numbers, or names of columns of the data.
         confidence : float, optional
@@ -435,10 +440,10 @@ class Analyses:
     @_analysis
     def optimise(self, free: _Free, *, maximise: str | None = None, minimise: str | None = None,  # type: ignore[empty-body]
                  subject_to: _Names | None = None, starts: int | None = None, seed: int | None = None, until: str | None = None,
-                 method: str | None = None, t_end: float | None = None, step: float | None = None, rtol: float | None = None,
-                 atol: float | None = None, max_steps: int | None = None, limit: float | None = None,
-                 jobs: int | None = None, specialise: str | None = None, output: _Path | None = None,
-                 plots: _Path | None = None) -> dict:
+                 method: str | None = None, method_file: _Path | None = None, t_end: float | None = None,
+                 step: float | None = None, rtol: float | None = None, atol: float | None = None, max_steps: int | None = None,
+                 limit: float | None = None, jobs: int | None = None, specialise: str | None = None,
+                 output: _Path | None = None, plots: _Path | None = None, width: str | None = None) -> dict:
         """Finds the parameters for which an output is largest or smallest.
 
         free : dict, str or list of str
