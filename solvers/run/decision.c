@@ -66,6 +66,18 @@ int pw_decision_solve (pw_decision *d, int skips) {
   return PW_OK;
 }
 
+int pw_decision_depends (pw_decision *d, int k) {
+  const signed char mode = d->trial[k];
+  int more = 0; /* equations are left out if k holds, too */
+  (void)pw_decision_solve (d, 1);
+  for (int i = 0; i < d->n; i++) more -= d->redundant[i];
+  d->trial[k] = 0;
+  (void)pw_decision_solve (d, 1);
+  for (int i = 0; i < d->n; i++) more += d->redundant[i];
+  d->trial[k] = mode;
+  return more > 0;
+}
+
 double pw_decision_z (const pw_decision *d, int k) {
   double z = d->b[k];
   for (int i = 0; i < d->n; i++) z -= d->A[k * d->n + i] * d->x[i];
@@ -160,7 +172,7 @@ static int decision_minimise (pw_decision *d) {
   double before = INFINITY;
   for (int pass = 0; pass < 10000; pass++) {
     double change = 0;
-    const int status = pw_decision_pivot (d, 0);
+    const int status = pw_decision_pivot (d, 1);
     for (int k = 0; k < d->n && status == PW_OK; k++)
       if (d->limit[d->list[k]].circle == 1) change = fmax (change, decision_step_on_circle (d, k));
     if (status != PW_OK || change == 0 || (change < 1e-12 && change >= before)) return status;
@@ -217,11 +229,11 @@ int pw_decide (pw_decision *d, int *count) {
   int coupled = 0, circles = 0;
   for (int k = 0; k < d->n; k++) coupled |= d->normal[k] >= 0, circles |= d->limit[d->list[k]].circle;
   *count = coupled && circles ? PW_DECISION_MIXED : -1;
-  if (!coupled) return decision_minimise (d);
-  if (circles) return PW_RETRY;
-  int status = pw_decision_pivot (d, 0);
+  if (coupled && circles) return PW_RETRY;
+  int status = coupled ? pw_decision_pivot (d, 0) : PW_RETRY;
   for (int k = 0; k < d->n && status != PW_OK; k++)
     if (!d->fixed[k]) d->trial[k] = 0;
-  if (status != PW_OK) status = pw_decision_pivot (d, 1); /* again, without redundant equations */
-  return decision_enumerate (d, status == PW_OK, count);
+  /* again, or from all that hold on, so that multipliers are not larger than others that depend on them require */
+  if (status != PW_OK) status = coupled ? pw_decision_pivot (d, 1) : decision_minimise (d);
+  return coupled ? decision_enumerate (d, status == PW_OK, count) : status;
 }

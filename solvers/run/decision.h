@@ -43,6 +43,9 @@ int pw_decision_solve (pw_decision *d, int skips);
 /* z of equation k at the present x. */
 double pw_decision_z (const pw_decision *d, int k);
 
+/* 1 if equation k depends on those whose trial mode is 0.  Destroys x. */
+int pw_decision_depends (pw_decision *d, int k);
+
 /* 1 for friction whose contact is open: nothing is required of it. */
 int pw_decision_apart (const pw_decision *d, int k);
 

@@ -43,6 +43,7 @@
 /* Distance of a multiplier [limits], or of u [units], from the boundary of a mode that is not round-off, nor that of
  * initial values with 6 digits. */
 #define EVENTS_BOUNDARY 1e-6
+#define EVENTS_PARTED 1e-9 /* u [units] of an equation that no longer depends on those that hold: more than round-off */
 enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
 
 typedef struct pw_events {
@@ -56,6 +57,7 @@ typedef struct pw_events {
   unsigned char *rests;                 /* 1: u is 0 after an impact */
   unsigned char *struck;                /* 1: it has had an impact since the last motion that was not too short */
   unsigned char *spare;                 /* 1: it holds since others do, on which it depends: its multiplier is 0 */
+  unsigned char *still;                 /* 1: at its limit, but u, of a circle the first one, is 0 since others hold */
   int *partner;                         /* of friction: its normal equation; -1: none */
   int *place;                           /* in D; -1: not in it */
   unsigned char *enforced;              /* rows: what r->enforced points to */
@@ -90,7 +92,7 @@ static int events_allocate (pw_run *r) {
                               &x->direction,  &x->bias, &x->reach, &x->d.towards, &x->mean };
   double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
   signed char **const mode[] = { &x->mode, &x->before, &x->d.trial };
-  unsigned char **const flag[] = { &x->armed,     &x->triggered, &x->rests,   &x->struck,
+  unsigned char **const flag[] = { &x->armed,     &x->triggered, &x->rests,   &x->struck,     &x->still,
                                    &x->d.blocked, &x->spare,     &x->d.fixed, &x->d.redundant };
   int **const index[] = { &x->row, &x->d.list, &x->d.held, &x->partner, &x->place, &x->d.normal };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
@@ -147,6 +149,16 @@ static void events_limits (pw_run *r) {
 /* 1 for friction of a contact that is open: it is off, whatever its mode. */
 static int events_apart (const pw_events *x, int i) {
   return x->partner[i] >= 0 && x->mode[x->partner[i]] != 0;
+}
+
+/* 1 if u is 0 since others hold, on which the equation depends. */
+static int events_depends (const pw_events *x, int i) {
+  return (x->spare[i] || (x->still[i] && !x->limit[i].circle)) && !events_apart (x, i);
+}
+
+/* The mode that users see. */
+static signed char events_shown (const pw_events *x, int i) {
+  return x->still[i] && !x->limit[i].circle ? 0 : x->mode[i];
 }
 
 /* The mode of an equation that does not hold: of one with two finite limits by the sign of u. */
@@ -324,10 +336,13 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
     }
     if (limit->circle == 2) value[2 * i] = -1;
     if (limit->circle) value[2 * i + 1] = -1;
-    if (x->spare[i] || events_apart (x, i)) value[2 * i] = value[2 * i + 1] = -1;
-    if (x->mode[i] == 0 || limit->circle == 2 || events_apart (x, i)) continue;
+    if ((x->spare[i] && !limit->circle) || events_apart (x, i)) value[2 * i] = value[2 * i + 1] = -1;
+    if (events_depends (x, i))
+      value[2 * i + (limit->circle == 1)] = fabs (x->u[i]) / x->unit[i] - EVENTS_PARTED - tolerance / 10;
+    if (x->mode[i] == 0 || limit->circle == 2 || events_apart (x, i) || (x->still[i] && !limit->circle)) continue;
     value[2 * i] = -u / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
     value[2 * i + 1] = -1;
+    if (x->still[i] && x->armed[i]) value[2 * i + 1] = EVENTS_SMALL / 2 - hypot (x->u[i], x->u[i + 1]) / x->unit[i];
   }
 }
 
@@ -594,14 +609,16 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     const int on = x->partner[i];
     const double speed = equations == 2 ? hypot (x->u[i], x->u[i + 1]) : fabs (x->u[i]), u = speed / x->unit[i];
     const int open = !x->rests[i] && events_open (r, i, g[i]);
+    const int parts = events_depends (x, i) || (equations == 2 && x->spare[i + 1]);
     const int misses = equations == 2 && x->triggered[i] && x->mode[i] && speed > x->reach[i]; /* u passes beside 0 */
     if (on >= 0 && x->place[on] < 0) {
-      x->mode[i] = 1, x->spare[i] = 0;
+      x->mode[i] = 1, x->spare[i] = x->still[i] = 0;
       continue;
     }
     const int moves = (jumps || (on >= 0 && x->before[on])) && !open;
-    if ((moves || misses) && u > EVENTS_SMALL) events_slide (x, i, x->u);
-    const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps && !misses;
+    if ((moves || misses || parts) && u > EVENTS_SMALL) events_slide (x, i, x->u);
+    const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps && !misses &&
+                      !(parts && u > EVENTS_SMALL);
     const int slides = x->mode[i] && !rolls && u > EVENTS_SMALL;
     if (open || (slides && on < 0)) continue;
     const double unit = on < 0 ? x->force_unit[i] : x->limit[i].most;
@@ -650,6 +667,11 @@ static int decide_modes (pw_run *r, pw_error *error) {
     if (x->limit[i].circle == 1) circle_set_bias (r, i, 0);
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
+    const int i = x->d.list[k], circle = x->limit[i].circle;
+    const int could = x->d.trial[k] && (circle == 1 || !(circle || x->d.fixed[k]));
+    x->still[i] = could && !pw_is_one_sided (&x->limit[i]) && pw_decision_depends (&x->d, k);
+  }
+  for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     x->d.normal[k] = -1, x->d.trial[k] = (signed char)x->d.fixed[k];
     x->d.x[k] = 0, x->d.b[k] = x->u[x->d.list[k]];
   }
@@ -665,11 +687,12 @@ static int decide_modes (pw_run *r, pw_error *error) {
 static int events_log (pw_run *r) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++) {
-    const int on = x->partner[i], changes = x->mode[i] != x->before[i] && (on < 0 || !(x->mode[on] || x->before[on]));
+    const int on = x->partner[i],
+              changes = events_shown (x, i) != x->before[i] && (on < 0 || !(x->mode[on] || x->before[on]));
     if ((!changes && x->impulse[i] == 0) || x->limit[i].circle == 2) continue;
     if (pw_grow (&r->event, (size_t)r->event_count, &r->event_room, sizeof *r->event) != PW_OK) return PW_RESOURCE;
     r->event[r->event_count++] =
-        (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], x->mode[i], x->impulse[i] != 0 };
+        (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], events_shown (x, i), x->impulse[i] != 0 };
   }
   return PW_OK;
 }
@@ -679,7 +702,10 @@ static int events_decide (pw_run *r, int jumps, pw_error *error) {
   pw_events *x = r->events;
   int impacts;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  memcpy (x->before, x->mode, (size_t)x->count);
+  for (int i = 0; i < x->count; i++) {
+    x->before[i] = events_shown (x, i);
+    if (x->spare[i] && x->triggered[i] && pw_is_one_sided (&x->limit[i])) x->mode[i] = events_off (x, i, 0);
+  }
   events_limits (r);
   events_u (r, r->v, 1, x->now);
   int status = decide_impacts (r, x->now, &impacts, error);
@@ -953,19 +979,22 @@ static int events_initial_sliding (pw_run *r, pw_error *error) {
   for (int i = 0; i < x->count; i++)
     if (x->mode[i] == 0 && !(x->row[i] < r->s->holonomic)) x->mode[i] = 1, x->direction[i] = 0;
   int status = events_consistent (r, error);
-  if (status != PW_OK) return status;
-  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  events_u (r, r->v, 0, x->u_before);
-  for (int i = 0; i < x->count; i++) {
+  for (int i = 0; i < x->count && status == PW_OK; i++) {
     pw_error own = { 0 };
     const int circle = x->limit[i].circle;
     if (pw_is_one_sided (&x->limit[i]) || x->limit[i].initially_slides || circle == 2) continue;
+    if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+    events_u (r, r->v, 0, x->u_before);
     x->mode[i] = 0;
     if (circle) x->mode[i + 1] = 0;
-    status = events_slides (x, i) || (circle && events_slides (x, i + 1)) ? events_consistent (r, &own) : PW_OK;
+    if (!events_slides (x, i) && !(circle && events_slides (x, i + 1))) continue;
+    status = events_consistent (r, &own);
     if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-    if (status != PW_OK || events_moved (r)) events_slide (x, i, x->u_before);
+    if (status == PW_OK && !events_moved (r)) continue;
+    events_slide (x, i, x->u_before);
+    status = events_consistent (r, error);
   }
+  if (status != PW_OK) return status;
   return events_consistent (r, error);
 }
 
@@ -992,6 +1021,20 @@ int pw_events_open (pw_run *r, pw_error *error) {
   return status == PW_OK ? events_initial_friction (r, error) : status;
 }
 
+int pw_events_spare (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  x->d.n = 0;
+  for (int i = 0; i < x->count; i++)
+    if (x->mode[i] == 0 && x->partner[i] < 0) decide_add (x, i, -INFINITY, INFINITY, 0);
+  pw_saddle *saddle = decision_open (r, 1, error);
+  if (saddle == NULL) return error && error->status == PW_RESOURCE ? PW_RESOURCE : PW_RETRY;
+  (void)pw_decision_solve (&x->d, 1);
+  for (int k = 0; k < x->d.n; k++) x->spare[x->d.list[k]] = x->d.redundant[k];
+  pw_saddle_close (saddle);
+  events_apply (r);
+  return PW_OK;
+}
+
 int pw_events_begin (pw_run *r, pw_error *error) {
   if (r->events == NULL) return PW_OK;
   events_units (r);
@@ -1006,7 +1049,7 @@ int pw_events_begin (pw_run *r, pw_error *error) {
 int pw_run_mode (const pw_run *r, int row) {
   const pw_events *x = r ? r->events : NULL;
   for (int i = 0; x && i < x->count; i++)
-    if (x->row[i] == row) return x->mode[i];
+    if (x->row[i] == row) return events_shown (x, i);
   return 0;
 }
 
@@ -1040,7 +1083,7 @@ int pw_events_check_modes (pw_run *r, const double *v, const double *lambda, pw_
     const double least = y - size * limit->least, most = size * limit->most - y;
     const double unit = x->mode[i] ? x->unit[i] : x->force_unit[i], margin = x->mode[i] ? u : fmin (least, most);
     const int changes = margin > -EVENTS_BOUNDARY * unit;
-    if (margin > EVENTS_BOUNDARY * unit || x->spare[i] || events_apart (x, i)) continue;
+    if (margin > EVENTS_BOUNDARY * unit || x->spare[i] || events_depends (x, i) || events_apart (x, i)) continue;
     if (x->mode[i] == 0)
       return pw_fail (error, PW_METHOD, "t = %.6g s: %s is %s a limit of its reaction: %.9g, limit %.9g", r->t, name,
                       changes ? "at" : "beyond", -y, -(least < most ? limit->least : limit->most));
@@ -1173,6 +1216,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->mode, (size_t)x->count);
   pw_archive_bytes (a, x->triggered, (size_t)x->count);
   pw_archive_bytes (a, x->spare, (size_t)x->count);
+  pw_archive_bytes (a, x->still, (size_t)x->count);
   pw_archive_bytes (a, x->struck, (size_t)x->count);
   pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
   pw_archive_bytes (a, x->direction, (size_t)x->count * sizeof *x->direction);
