@@ -51,6 +51,20 @@ int pw_impulses_solve (pw_run *r, pw_projector *p, double h, double t, const dou
 /* As pw_project_positions, with limited equations that hold, and those whose g is on the wrong side of its limit. */
 int pw_impulses_project (pw_run *r, pw_projector *p, double t, double *q, const double *v);
 
+/* ---- Conditions on states in signals (sides.c) ---- */
+
+/* Opens r->sides; it stays NULL where no signal has conditions. */
+int pw_sides_open (pw_run *r, pw_error *error);
+
+/* Before a step: fixes the sides, unless they are, and refuses to slide along a condition. */
+int pw_sides_begin (pw_run *r, pw_error *error);
+
+/* After a step from t0: if a condition changes its side in it, the state there becomes the state reached, from which
+ * the method restarts. */
+int pw_sides_follow (pw_run *r, double t0, pw_error *error);
+
+/* ---- Checkpoints ---- */
+
 /* Saves or loads the modes and the events so far. */
 void pw_events_serialise (pw_run *r, pw_archive *a);
 

@@ -5,7 +5,6 @@
 #include <string.h>
 #include "events.h"
 #include "resolution.h"
-#include "sides.h"
 #include "methods.h"
 #include "rank.h"
 #include "method.h"

@@ -12,7 +12,6 @@
 #include <string.h>
 #include "crossing.h"
 #include "events.h"
-#include "sides.h"
 #include "util.h"
 
 #define SIDES_SLIDE 1e-9      /* [T] a condition that would return to its root within this time slides along it */
