@@ -1,4 +1,4 @@
-/* Decisions: linear complementarity problems with two-sided limits (events.c).  The limits of friction of a contact are
+/* Decisions: linear complementarity problems with two-sided limits (modes.c).  The limits of friction of a contact are
  * multiples of the normal multiplier.  A circle limits the resultant of two multipliers. */
 #include <math.h>
 #include <string.h>

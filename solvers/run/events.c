@@ -1,7 +1,7 @@
 /* Events: the times at which the modes of constraint equations change (modes.c).
  *
- * An event is a root of a multiplier less a limit, or of u.  After each step it is sought in the dense output; the state
- * there becomes the state reached.  Before the next step the modes are decided and the method begins anew. */
+ * An event is a root of a multiplier less a limit, or of u.  After each step it is sought in the dense output; the
+ * state there becomes the state reached.  Before the next step the modes are decided and the method begins anew. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>

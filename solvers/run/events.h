@@ -7,8 +7,8 @@
  * a limit.  As pw_run_make_consistent, which it calls, also where the scene has no limits. */
 int pw_events_open (pw_run *r, pw_error *error);
 
-/* Leaves out equations with limits that depend on others that hold: their multipliers are 0 as long as those of the others
- * are within their limits.  PW_RETRY if equations without limits depend on each other. */
+/* Leaves out equations with limits that depend on others that hold: their multipliers are 0 as long as those of the
+ * others are within their limits.  PW_RETRY if equations without limits depend on each other. */
 int pw_events_spare (pw_run *r, pw_error *error);
 
 /* After pw_run_evaluate and the choice of the scales: decides the modes at the initial state, before the method is
