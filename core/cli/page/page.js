@@ -429,14 +429,17 @@ function setAddress () {
 async function estimate (result, used, change) {
   try {
     const reference = await engine.call("run", { ...used, method: "erk8+projection", rtol: 1e-13 }, longRun);
-    if (change !== changes || reference.reason) return;
+    if (change !== changes) return;
+    if (reference.reason) throw new Error(reference.reason);
     result.ms = Math.max(await engine.call("time", used, longRun), 0.01); /* logarithmic axes have no 0 */
     if (change !== changes) return;
     const error = difference(result, reference);
     addRun(used, result.ms, Math.max(error, 1e-16));
     showCost(result, error);
     document.documentElement.dataset.estimated = error;
-  } catch (error) { /* without a reference, the error remains unknown */ }
+  } catch (error) {
+    if (change === changes) showCost(result, undefined); /* there is no reference */
+  }
 }
 
 /* Adds a run to the plot, in place of one with the same settings. */
