@@ -79,11 +79,13 @@ static size_t nearest_distance (const char *a, const char *b) {
 }
 
 /* Two names are near if less than half of the longer one has to change, or exactly half where that is at most two
- * characters, or if one begins or ends with the other. */
+ * characters, or if one begins or ends with the other; a single character only if it follows a dot. */
 static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
-  size_t longer = n > m ? n : m, shorter = n + m - longer;
-  return 2 * distance < longer || (2 * distance == longer && distance <= 2) ||
-         (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
+  const size_t longer = n > m ? n : m, shorter = n + m - longer;
+  const int begins = shorter > 1 && memcmp (a, b, shorter) == 0,
+            ends = shorter > 0 && memcmp (a + n - shorter, b + m - shorter, shorter) == 0;
+  return 2 * distance < longer || (2 * distance == longer && distance <= 2) || begins ||
+         (ends && (shorter > 1 || (longer > 1 && (n > m ? a : b)[longer - 2] == '.')));
 }
 
 static void nearest_append (pw_nearest *n, const char *candidate) {

@@ -210,8 +210,9 @@ PW_COMMANDS (PW_COMMAND)
       PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A",                            \
                       "Absolute tolerance of every state (default rtol times its scale)")
 
-/* Reads the command line (argv[0] is not read), runs the command and reports its error; returns the exit status. */
-int pw_cli_main (const pw_command *command, int argc, const char **argv);
+/* Reads the command line (argv[0] is not read), runs the command and reports its error; returns the exit status.  all:
+ * the commands, ended by NULL, for messages, or NULL. */
+int pw_cli_main (const pw_command *command, const pw_command *const *all, int argc, const char **argv);
 
 /* Refuses more than one argument. */
 int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_error *error);
@@ -273,6 +274,9 @@ int pw_cli_assignment (const char *option, const char *text, const char *form, c
 int pw_cli_apply (const pw_cli_line *line, pw_model *m, pw_error *error);
 /* 1 if the name may be that of a state: it has a dot, or the model with its defaults has this first-order state. */
 int pw_cli_is_state (const pw_file *file, const char *name);
+/* Fails: a model of the file has no parameter of this name, with the nearest one or else the nearest state, where
+ * `states` are valid, too. */
+int pw_cli_no_parameter (const pw_file *file, pw_model *m, const char *name, int states, pw_error *error);
 
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
@@ -343,8 +347,8 @@ int pw_files_finish (pw_cli_line *line, pw_error *error);
 void pw_files_close (pw_files *files);
 
 /* Writes the table that `csv` writes to a file in the format that the ending of its path states: .csv; .npz, a NumPy
- * archive with a vector of each column of numbers; or .json, an object with a list of each column.  Statuses of csv,
- * PW_RESOURCE. */
+ * archive with a vector of each column, named without unit; or .json, an object with a list of each column.  Statuses
+ * of csv, PW_RESOURCE. */
 int pw_cli_write_table (const char *path, FILE *f, const void *context,
                         int (*csv) (const void *context, FILE *f, pw_error *error), pw_error *error);
 /* Whether a name ends as that of a file: ".csv", ".png", ... */
@@ -364,6 +368,8 @@ void pw_json_print (pw_json *j, const char *format, ...) PW_PRINTF (2, 3);
 
 /* A number as text (pw_format), in a buffer that lives as long as the block around it. */
 #define PW_DIGITS(value, digits) pw_format ((char[32]){ 0 }, value, digits)
+/* What to write in place of a number with a unit (pw_number_hint), likewise. */
+#define PW_NUMBER_HINT(text) pw_number_hint (text, (char[PW_HINT]){ 0 }, PW_HINT)
 
 /* "1 run", "2 runs", likewise. */
 #define PW_COUNTED(count, noun) PW_PRINTED (60, "%ld %s%s", (long)(count), noun, (count) == 1 ? "" : "s")

@@ -91,66 +91,99 @@ int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error
 
 /* ---- Tables ---- */
 
-/* Moves *at past a cell, and stores its text without quotes, which are doubled inside; returns what ends the cell. */
+/* Moves *at past a cell, and stores its text, unless `cell` is NULL, without quotes, which are doubled inside; returns
+ * what ends the cell. */
 static char table_cell (const char **at, pw_text *cell) {
   const char *c = *at;
   const int quoted = *c == '"';
-  pw_text_clear (cell);
+  if (cell) pw_text_clear (cell);
   for (c += quoted; *c && (quoted || (*c != ',' && *c != '\n')); c++) {
     if (quoted && *c == '"' && *++c != '"') break;
-    pw_text_add_bytes (cell, c, 1);
+    if (cell) pw_text_add_bytes (cell, c, 1);
   }
   const char end = *c;
   *at = c + (end != 0);
   return end;
 }
 
-/* Column k of a table without its heading: stores the numbers, NaN for empty cells and texts; returns 1 if there are
- * only numbers.  With j, the cells are written as items of JSON. */
-static int table_column (const char *rows, int k, double *value, pw_json *j, pw_text *cell) {
-  int numbers = 1, i = 0;
-  for (const char *at = rows; *at; i++) {
-    char end = ',';
-    for (int c = 0; c <= k && end == ','; c++) end = table_cell (&at, cell);
-    const char *text = cell->chars ? cell->chars : "";
-    value[i] = NAN;
-    const int is_number = pw_read_number (text, &value[i]) == PW_OK;
-    numbers &= is_number || *text == 0;
-    if (j && (is_number || *text == 0)) pw_json_number (j, NULL, value[i]);
-    if (j && !is_number && *text) pw_json_text (j, NULL, text);
-    while (end == ',') end = table_cell (&at, cell);
+/* Moves *at past a row, and stores its cell k and the number in it, else NaN; returns 1 if it is a text: in quotes, or
+ * neither a number nor empty. */
+static int table_row (const char **at, int k, pw_text *cell, double *value) {
+  int quoted = 0;
+  char end = ',';
+  for (int c = 0; c <= k && end == ','; c++) quoted = **at == '"', end = table_cell (at, cell);
+  while (end == ',') end = table_cell (at, NULL);
+  *value = NAN;
+  return (cell->length && pw_read_number (cell->chars, value) != PW_OK) || quoted;
+}
+
+/* Writes column k of a table without its heading as items of JSON. */
+static void table_json (const char *rows, int k, pw_json *j, pw_text *cell) {
+  double value;
+  for (const char *at = rows; *at;)
+    if (table_row (&at, k, cell, &value) && cell->length)
+      pw_json_text (j, NULL, cell->chars);
+    else
+      pw_json_number (j, NULL, value);
+}
+
+/* Stores the characters of a text in UTF-8. */
+static void table_characters (const char *text, uint32_t *to) {
+  for (const unsigned char *c = (const unsigned char *)text; *c; to++) {
+    int more = *c >= 0xF0 ? 3 : *c >= 0xE0 ? 2 : *c >= 0xC0 ? 1 : 0; /* bytes of the character that follow */
+    for (*to = *c++ & (more ? 0x3Fu >> more : 0xFFu); more > 0 && *c; more--) *to = *to << 6 | (*c++ & 0x3Fu);
   }
-  return numbers;
+}
+
+/* Adds column k of a table without its heading to an archive: numbers, NaN for empty cells; or if a cell is a text,
+ * texts.  PW_OK or PW_RESOURCE. */
+static int table_npz (const char *rows, long count, int k, const char *name, pw_npz *z, pw_text *cell) {
+  double *value = malloc (((size_t)count + 1) * sizeof *value), *next = value;
+  size_t width = 1; /* bytes of the longest text */
+  int texts = 0;
+  for (const char *at = rows; value && *at; next++) {
+    texts |= table_row (&at, k, cell, next);
+    if (cell->length > width) width = cell->length;
+  }
+  if (value && !texts) pw_npz_add (z, name, count, -1, 1, value);
+  uint32_t *text = texts ? calloc ((size_t)count * width, sizeof *text) : NULL, *to = text;
+  for (const char *at = rows; text && *at; to += width)
+    if (table_row (&at, k, cell, value) || cell->length) table_characters (cell->chars, to);
+  if (text) pw_npz_add_texts (z, name, count, (int)width, text);
+  const int status = value && (text || !texts) ? PW_OK : PW_RESOURCE;
+  free (value);
+  free (text);
+  return status;
 }
 
 /* Writes a CSV table as NPZ or JSON. */
 static int table_convert (const char *csv, int is_json, FILE *f, pw_error *error) {
-  const int is_npz = !is_json;
   const char *rows = strchr (csv, '\n') ? strchr (csv, '\n') + 1 : "", *at = csv;
   pw_text name = { .chars = NULL }, cell = { .chars = NULL };
   pw_npz z = { .f = f };
   pw_json j = { .f = f, .lines = 1 };
   long count = 0;
+  int status = PW_OK;
   for (const char *c = rows; *c; c++) count += *c == '\n';
-  double *value = malloc (((size_t)count + 1) * sizeof *value);
   if (is_json) pw_json_open (&j, NULL, '{');
-  for (int k = 0; value && at < rows; k++) {
+  for (int k = 0; status == PW_OK && at < rows; k++) {
     table_cell (&at, &name);
-    const char *text = name.chars ? name.chars : "";
-    if (is_json) pw_json_open (&j, text, '[');
-    const int numbers = table_column (rows, k, value, is_json ? &j : NULL, &cell);
-    if (is_json) pw_json_close (&j, ']');
-    if (is_npz && numbers)
-      pw_npz_add (&z, PW_PRINTED (300, "%.*s", (int)(strstr (text, " [") ? strstr (text, " [") - text : 299), text),
-                  count, -1, 1, value);
+    char *text = name.chars ? name.chars : "", *unit = strstr (text, " [");
+    if (is_json) {
+      pw_json_open (&j, text, '[');
+      table_json (rows, k, &j, &cell);
+      pw_json_close (&j, ']');
+    } else {
+      if (unit) *unit = 0;
+      status = table_npz (rows, count, k, text, &z, &cell);
+    }
   }
   if (is_json) pw_json_close (&j, '}');
-  const int failed = value == NULL || name.failed || cell.failed;
+  if (name.failed || cell.failed) status = PW_RESOURCE;
   pw_text_free (&name);
   pw_text_free (&cell);
-  free (value);
-  int status = is_npz ? pw_npz_end (&z, error) : PW_OK;
-  return failed ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
+  const int ended = is_json ? PW_OK : pw_npz_end (&z, error);
+  return status == PW_OK ? ended : pw_fail (error, status, "out of memory");
 }
 
 int pw_cli_write_table (const char *path, FILE *f, const void *context,

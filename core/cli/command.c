@@ -82,8 +82,21 @@ static void command_help (const pw_command *command) {
 
 /* ---- Reading ---- */
 
+/* Writes the commands that have an option of this name, " (sweep and drift have it)"; "" if none has. */
+static const char *command_others (const pw_command *const *all, const char *name, char text[PW_HINT]) {
+  int used = 0;
+  *text = 0;
+  for (; all && *all; all++)
+    for (const struct poptOption *o = (*all)->options; !command_is_end (o); o++)
+      if (o->longName && o->descrip && strcmp (o->longName, name) == 0 && used < PW_HINT)
+        used += snprintf (text + used, (size_t)(PW_HINT - used), "%s%s", used ? ", " : " (an option of ", (*all)->name);
+  if (used > 0 && used < PW_HINT - 1) strcat (text, ")");
+  return text;
+}
+
 /* Reports the option that popt has refused with this error code. */
-static int command_refuse (const pw_command *command, const pw_cli_line *line, int code, pw_error *error) {
+static int command_refuse (const pw_command *command, const pw_command *const *all, const pw_cli_line *line, int code,
+                           pw_error *error) {
   const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS), *name = option + strspn (option, "-");
   if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
   if (code != POPT_ERROR_BADOPT)
@@ -93,8 +106,8 @@ static int command_refuse (const pw_command *command, const pw_cli_line *line, i
     if (o->descrip) pw_nearest_try (&near, o->longName);
   const char *hint = near.near ? PW_PRINTED (140, "did you mean \"--%s\"?", near.best)
                                : PW_PRINTED (140, "see pinwheel %s --help", command->name);
-  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", command->name, (int)strcspn (option, "="), option,
-                  hint);
+  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"%s; %s", command->name, (int)strcspn (option, "="), option,
+                  command_others (all, near.sought, (char[PW_HINT]){ 0 }), hint);
 }
 
 int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_error *error) {
@@ -104,7 +117,8 @@ int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_e
 }
 
 /* Reads the command line.  PW_OK; 1 if help was requested and has been printed; or a negative status. */
-static int command_read (const pw_command *command, pw_cli_line *line, int argc, const char **argv, pw_error *error) {
+static int command_read (const pw_command *command, const pw_command *const *all, pw_cli_line *line, int argc,
+                         const char **argv, pw_error *error) {
   errno = 0;
   if (command_bind (line, command->options) == PW_OK)
     line->popt = poptGetContext (argv[0], argc, argv, line->options, 0);
@@ -118,7 +132,7 @@ static int command_read (const pw_command *command, pw_cli_line *line, int argc,
     command_help (command);
     return 1;
   }
-  if (number < -1) return command_refuse (command, line, number, error); /* -1: no more options */
+  if (number < -1) return command_refuse (command, all, line, number, error); /* -1: no more options */
   line->argument = poptGetArgs (line->popt);
   while (line->argument && line->argument[line->arguments]) line->arguments++;
   if (command->any_arguments) return PW_OK;
@@ -145,13 +159,14 @@ static void command_close (pw_cli_line *line) {
   free (line);
 }
 
-int pw_cli_main (const pw_command *command, int argc, const char **argv) {
+int pw_cli_main (const pw_command *command, const pw_command *const *all, int argc, const char **argv) {
   gsl_set_error_handler_off (); /* the default handler ends the program */
   pw_stop_release ();
   pw_error error = { 0 };
   int exit_status = 0; /* that of errors follows from `error` */
   pw_cli_line *line = calloc (1, command->options_size);
-  int status = line ? command_read (command, line, argc, argv, &error) : pw_fail (&error, PW_RESOURCE, "out of memory");
+  int status =
+      line ? command_read (command, all, line, argc, argv, &error) : pw_fail (&error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) exit_status = command->function (line, &error);
   if (line) command_close (line);
   return exit_status > 0 ? exit_status : pw_cli_report_error (&error);
@@ -169,7 +184,8 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
   double number;
   int status = pw_read_expression (text, &number);
   if (status == PW_RESOURCE) return pw_fail (error, status, "out of memory");
-  if (status != PW_OK) return pw_fail (error, status, "%s: \"%s\" is not a number", option, text);
+  if (status != PW_OK)
+    return pw_fail (error, status, "%s: \"%s\" is not a number%s", option, text, PW_NUMBER_HINT (text));
   const char *expected = pw_domain_check (domain, number);
   if (*expected) return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, expected);
   *value = number;
@@ -186,11 +202,13 @@ int pw_cli_range (const char *option, const char *text, pw_range *range, pw_erro
   const char *equals = strchr (text, '='), *begin = equals ? equals + 1 : text;
   const int old = strncmp (begin, "lin:", 4) == 0 || strncmp (begin, "log:", 4) == 0;
   double number[3] = { 0 };
+  char hint[PW_HINT] = "";
   int n = 0, good = 1;
   *range = (pw_range){ .logarithmic = old && begin[1] == 'o' };
   for (const char *c = begin + 4 * old; c && good;) {
     const size_t size = pw_cli_part (c, ':');
     const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
+    pw_number_hint (part, hint, sizeof hint);
     c = c[size] ? c + size + 1 : NULL;
     if (n >= 2 && c == NULL && strcmp (part, "log") == 0)
       range->logarithmic = 1;
@@ -199,8 +217,8 @@ int pw_cli_range (const char *option, const char *text, pw_range *range, pw_erro
   }
   range->low = number[0], range->high = number[1];
   if (!good || n < 2 || !isfinite (range->high - range->low))
-    return pw_fail (error, PW_INPUT, "%s %s: expected %sLOW:HIGH[:COUNT][:log], numbers", option, text,
-                    equals ? "NAME=" : "");
+    return pw_fail (error, PW_INPUT, "%s %s: expected %sLOW:HIGH[:COUNT][:log], numbers%s", option, text,
+                    equals ? "NAME=" : "", hint);
   if (n == 3 && *pw_domain_check (PW_COUNT, number[2]))
     return pw_fail (error, PW_INPUT, "%s %s: expected a count that is a whole number >= 1", option, text);
   range->count = (long)number[2];
@@ -270,17 +288,37 @@ int pw_cli_assignment (const char *option, const char *text, const char *form, c
   snprintf (name, PW_ASSIGNED_NAME, "%.*s", (int)(equals - text), text);
   int status = pw_read_expression (equals + 1, value);
   if (status == PW_RESOURCE) return pw_fail (error, status, "out of memory");
-  return status == PW_OK ? status : pw_fail (error, status, "%s %s: \"%s\" is not a number", option, text, equals + 1);
+  if (status == PW_OK) return status;
+  return pw_fail (error, status, "%s %s: \"%s\" is not a number%s", option, text, equals + 1,
+                  PW_NUMBER_HINT (equals + 1));
+}
+
+/* The system of a model with its defaults; NULL if there is none. */
+static pw_system *cli_default_system (const pw_file *file) {
+  pw_model *m = pw_file_model (file, NULL);
+  pw_system *s = m && pw_model_build (m, NULL) == PW_OK ? pw_system_compile (m, NULL) : NULL;
+  pw_model_free (m);
+  return s;
 }
 
 int pw_cli_is_state (const pw_file *file, const char *name) {
-  pw_error none = { 0 };
-  pw_model *m = strchr (name, '.') ? NULL : pw_file_model (file, &none);
-  pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
-  const int found = strchr (name, '.') || (s && pw_system_find_state (s, name, &none) >= 0);
+  if (strchr (name, '.')) return 1;
+  pw_system *s = cli_default_system (file);
+  const int found = s && pw_system_find_state (s, name, NULL) >= 0;
   pw_system_free (s);
-  pw_model_free (m);
   return found;
+}
+
+int pw_cli_no_parameter (const pw_file *file, pw_model *m, const char *name, int states, pw_error *error) {
+  pw_system *s = cli_default_system (file);
+  pw_nearest state = { .sought = name }, parameter = state;
+  for (const pw_parameter *p = pw_model_table (m)->parameters; p && p->name; p++) pw_nearest_try (&parameter, p->name);
+  for (int i = 0; s && i < 2 * pw_system_coordinates (s); i++)
+    if (!pw_system_state_hidden (s, i)) pw_nearest_try (&state, PW_NAME (pw_system_state_name, s, i));
+  pw_system_free (s);
+  if (parameter.near || !state.near) return pw_model_set (m, name, 0, error);
+  return pw_fail (error, PW_INPUT, "model %s has no parameter%s \"%s\"; did you mean %s\"%s\"?", pw_model_name (m),
+                  states ? " or state" : "", name, states ? "" : "--start ", state.best);
 }
 
 /* Sets a parameter that the model does not have: fails with a hint. */
@@ -289,7 +327,7 @@ static int cli_set_other (const pw_cli_line *line, pw_model *m, const char *text
   if (pw_cli_is_state (line->m.file, name))
     return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
                     text);
-  if (included == NULL) return pw_model_set (m, name, 0, error);
+  if (included == NULL) return pw_cli_no_parameter (line->m.file, m, name, 0, error);
   return pw_fail (
       error, PW_INPUT,
       "--set %s: %s is a parameter of an included file; the model sets it by \"set: {%s: NAME}\" in the entry "

@@ -31,7 +31,7 @@ static int main_command (int argc, const char **argv) {
   pw_error error = { 0 };
   pw_nearest near = { .sought = word };
   for (const pw_command *const *c = main_commands; *c; c++) {
-    if (strcmp ((*c)->name, word) == 0) return pw_cli_main (*c, argc, argv);
+    if (strcmp ((*c)->name, word) == 0) return pw_cli_main (*c, main_commands, argc, argv);
     pw_nearest_try (&near, (*c)->name);
   }
   for (const char *const *o = (const char *const[]){ "help", "--help", "--version", NULL }; *o; o++)

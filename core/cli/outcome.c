@@ -208,7 +208,11 @@ static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *or
   for (int i = 0; i < PW_FORMULA_NAMES; i++) names[i] = outcome_variable (variables[i], i);
   pw_error own = { 0 };
   o->formula = pw_formula_open (text, names, &own);
-  return o->formula ? PW_OK : pw_fail (error, own.status, "%s: %s", origin, own.text);
+  if (o->formula) return PW_OK;
+  const int extremum =
+      strcmp (own.text, "too few arguments") == 0 && (strstr (o->text, "max") || strstr (o->text, "min"));
+  return pw_fail (error, own.status, "%s: %s%s", origin, own.text,
+                  extremum ? "; extrema over the run are max:COLUMN and min:COLUMN" : "");
 }
 
 int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, const char *const *text, int count,

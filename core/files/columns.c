@@ -345,58 +345,65 @@ double *pw_read_columns (const char *path, const char *const *column, const char
  * it.  Angles are a separate dimension, since 1/s could mean turns or radians. */
 
 /* The name km/h, and parentheses, are for messages of yaml.c, which take the first name of this list in a text. */
+#define deg (PW_PI / 180)
+#define pi PW_PI
+#define UNIT(name, factor, si) \
+  { name, #factor, factor, si }
 const pw_unit_name pw_unit_names[] = {
-  { "m", "1", "m" },
-  { "kg", "1", "kg" },
-  { "s", "1", "s" },
-  { "rad", "1", "rad" },
-  { "N", "1", "kg m/s^2" },
-  { "J", "1", "kg m^2/s^2" },
-  { "W", "1", "kg m^2/s^3" },
-  { "degrees", "deg", "rad" },
-  { "degree", "deg", "rad" },
-  { "deg", "deg", "rad" },
-  { "°", "deg", "rad" },
-  { "grad", "(pi/200)", "rad" },
-  { "gon", "(pi/200)", "rad" },
-  { "mrad", "1e-3", "rad" },
-  { "rev", "(2*pi)", "rad" },
-  { "rpm", "(pi/30)", "rad/s" },
-  { "km/h", "(1/3.6)", "m/s" },
-  { "mph", "0.44704", "m/s" },
-  { "ft", "0.3048", "m" },
-  { "mi", "1609.344", "m" },
-  { "um", "1e-6", "m" },
-  { "\xC2\xB5m", "1e-6", "m" }, /* the micro sign, then the Greek letter */
-  { "\xCE\xBCm", "1e-6", "m" },
-  { "mm", "1e-3", "m" },
-  { "cm", "1e-2", "m" },
-  { "dm", "0.1", "m" },
-  { "km", "1e3", "m" },
-  { "us", "1e-6", "s" },
-  { "\xC2\xB5s", "1e-6", "s" },
-  { "\xCE\xBCs", "1e-6", "s" },
-  { "ms", "1e-3", "s" },
-  { "min", "60", "s" },
-  { "h", "3600", "s" },
-  { "mN", "1e-3", "N" },
-  { "kN", "1e3", "N" },
-  { "MN", "1e6", "N" },
-  { "Nm", "1", "N m" },
-  { "kNm", "1e3", "N m" },
-  { "Nmm", "1e-3", "N m" },
-  { "g", "1e-3", "kg" },
-  { "mg", "1e-6", "kg" },
-  { "ug", "1e-9", "kg" },
-  { "\xC2\xB5g", "1e-9", "kg" },
-  { "\xCE\xBCg", "1e-9", "kg" },
-  { "lb", "0.45359237", "kg" },
-  { "lbf", "4.4482216152605", "N" },
-  { "kJ", "1e3", "J" },
-  { "kW", "1e3", "W" },
-  { "in", "0.0254", "m" }, /* the last: yaml.c takes other units first, since it may be a preposition */
+  UNIT ("m", 1, "m"),
+  UNIT ("kg", 1, "kg"),
+  UNIT ("s", 1, "s"),
+  UNIT ("rad", 1, "rad"),
+  UNIT ("N", 1, "kg m/s^2"),
+  UNIT ("J", 1, "kg m^2/s^2"),
+  UNIT ("W", 1, "kg m^2/s^3"),
+  UNIT ("degrees", deg, "rad"),
+  UNIT ("degree", deg, "rad"),
+  UNIT ("deg", deg, "rad"),
+  UNIT ("°", deg, "rad"),
+  UNIT ("grad", (pi / 200), "rad"),
+  UNIT ("gon", (pi / 200), "rad"),
+  UNIT ("mrad", 1e-3, "rad"),
+  UNIT ("rev", (2 * pi), "rad"),
+  UNIT ("rpm", (pi / 30), "rad/s"),
+  UNIT ("km/h", (1 / 3.6), "m/s"),
+  UNIT ("mph", 0.44704, "m/s"),
+  UNIT ("ft", 0.3048, "m"),
+  UNIT ("mi", 1609.344, "m"),
+  UNIT ("um", 1e-6, "m"),
+  UNIT ("\xC2\xB5m", 1e-6, "m"), /* the micro sign, then the Greek letter */
+  UNIT ("\xCE\xBCm", 1e-6, "m"),
+  UNIT ("mm", 1e-3, "m"),
+  UNIT ("cm", 1e-2, "m"),
+  UNIT ("dm", 0.1, "m"),
+  UNIT ("km", 1e3, "m"),
+  UNIT ("us", 1e-6, "s"),
+  UNIT ("\xC2\xB5s", 1e-6, "s"),
+  UNIT ("\xCE\xBCs", 1e-6, "s"),
+  UNIT ("ms", 1e-3, "s"),
+  UNIT ("min", 60, "s"),
+  UNIT ("h", 3600, "s"),
+  UNIT ("mN", 1e-3, "N"),
+  UNIT ("kN", 1e3, "N"),
+  UNIT ("MN", 1e6, "N"),
+  UNIT ("Nm", 1, "N m"),
+  UNIT ("kNm", 1e3, "N m"),
+  UNIT ("Nmm", 1e-3, "N m"),
+  UNIT ("g", 1e-3, "kg"),
+  UNIT ("mg", 1e-6, "kg"),
+  UNIT ("ug", 1e-9, "kg"),
+  UNIT ("\xC2\xB5g", 1e-9, "kg"),
+  UNIT ("\xCE\xBCg", 1e-9, "kg"),
+  UNIT ("lb", 0.45359237, "kg"),
+  UNIT ("lbf", 4.4482216152605, "N"),
+  UNIT ("kJ", 1e3, "J"),
+  UNIT ("kW", 1e3, "W"),
+  UNIT ("in", 0.0254, "m"), /* the last: yaml.c takes other units first, since it may be a preposition */
   { .name = NULL },
 };
+#undef UNIT
+#undef pi
+#undef deg
 
 enum { UNITS_BASE = 4 }; /* base units, first in the list */
 
@@ -417,10 +424,8 @@ static int units_multiply (const char *name, size_t n, int power, units_value *u
   if (unit < pw_unit_names + UNITS_BASE)
     one.power[unit - pw_unit_names] = 1;
   else if (unit->name) {
-    double factor = 1;
-    pw_read_expression (unit->factor, &factor);
     units_read (unit->si, &one);
-    one.factor *= factor;
+    one.factor *= unit->value;
   }
   u->factor *= power == 1 ? one.factor : pow (one.factor, power);
   for (int k = 0; k < UNITS_BASE; k++) u->power[k] += power * one.power[k];

@@ -213,27 +213,38 @@ static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
   npz_number (z, 0, 2);
 }
 
-void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
+/* Adds an array of items of this type, "f8". */
+static void npz_array (pw_npz *z, const char *name, const char *type, const char *shape, const void *item,
+                       size_t size) {
   char head[NPZ_HEAD + 1] = "\x93NUMPY\x01";
-  size_t size = (size_t)rows * (size_t)(columns < 0 ? 1 : columns) * (size_t)parts * sizeof *value;
   z->failed |= pw_grow (&z->entry, (size_t)z->count, &z->room, sizeof *z->entry) != PW_OK;
   if (z->failed) return;
   struct pw_npz_entry *e = z->entry + z->count++;
-  const char *shape = columns < 0 ? PW_PRINTED (60, "%ld,", rows) : PW_PRINTED (60, "%ld, %ld", rows, columns);
   head[8] = NPZ_HEAD - 10; /* bytes of the header after its length, in two bytes */
-  sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",
-           *(const char *)&(int){ 1 } ? '<' : '>', parts == 2 ? "c16" : "f8", shape);
+  snprintf (head + 10, NPZ_HEAD - 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",
+            *(const char *)&(int){ 1 } ? '<' : '>', type, shape);
   memset (strchr (head + 10, 0), ' ', (size_t)(head + NPZ_HEAD - strchr (head + 10, 0)));
   head[NPZ_HEAD - 1] = '\n';
   snprintf (e->name, sizeof e->name, "%.300s.npy", name);
-  e->check = npz_crc (npz_crc (0, head, NPZ_HEAD), value, size);
+  e->check = npz_crc (npz_crc (0, head, NPZ_HEAD), item, size);
   e->size = NPZ_HEAD + size;
   e->offset = z->at;
   npz_number (z, NPZ_FILE, 4);
   npz_describe (z, e);
   npz_bytes (z, e->name, strlen (e->name));
   npz_bytes (z, head, NPZ_HEAD);
-  npz_bytes (z, value, size);
+  npz_bytes (z, item, size);
+}
+
+void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
+  const char *shape = columns < 0 ? PW_PRINTED (60, "%ld,", rows) : PW_PRINTED (60, "%ld, %ld", rows, columns);
+  npz_array (z, name, parts == 2 ? "c16" : "f8", shape, value,
+             (size_t)rows * (size_t)(columns < 0 ? 1 : columns) * (size_t)parts * sizeof *value);
+}
+
+void pw_npz_add_texts (pw_npz *z, const char *name, long rows, int width, const uint32_t *character) {
+  npz_array (z, name, PW_PRINTED (20, "U%d", width), PW_PRINTED (60, "%ld,", rows), character,
+             (size_t)rows * (size_t)width * sizeof *character);
 }
 
 int pw_npz_end (pw_npz *z, pw_error *error) {

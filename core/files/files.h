@@ -28,7 +28,9 @@ double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *c
 
 /* A known unit: "mm" is "1e-3" of "m".  The first four are the base units. */
 typedef struct {
-  const char *name, *factor, *si; /* the factor is an expression; "1": an SI unit */
+  const char *name, *factor; /* the factor is an expression, with this value; "1": an SI unit */
+  double value;
+  const char *si;
 } pw_unit_name;
 
 extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */

@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "expression_parts.h"
+#include "files.h"
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
@@ -43,6 +44,23 @@ static size_t number_size (const char *p) {
   const char *exponent = end + 1 + (end[1] == '+' || end[1] == '-');
   size_t digits = strspn (exponent, DIGITS);
   return (size_t)(digits ? exponent + digits - p : end - p);
+}
+
+char *pw_number_hint (const char *text, char *buffer, size_t size) {
+  const size_t sign = *text == '+' || *text == '-', n = sign + number_size (text + sign);
+  const char *unit = text + n + strspn (text + n, " "), *factor = strcmp (unit, "pi") == 0 ? unit : NULL;
+  char number[32];
+  double value;
+  *buffer = 0;
+  if (n == sign || *unit == 0) return buffer;
+  for (const pw_unit_name *u = pw_unit_names; u->name && !factor; u++)
+    if (strcmp (u->name, unit) == 0) factor = u->factor;
+  if (factor == NULL && pw_unit_factor (unit, NULL, &value) == PW_OK) factor = pw_format (number, value, 12);
+  if (factor == NULL) return buffer;
+  if (pw_expression_is_reserved (factor)) return pw_print (buffer, size, "; write %.*s*%s", (int)n, text, factor);
+  const char *times = strcmp (factor, "1") == 0 ? "" : "*";
+  return pw_print (buffer, size, "; write %.*s%s%s: numbers are in SI units", (int)n, text, times,
+                   *times ? factor : "");
 }
 
 /* Whether an opening parenthesis follows. */
@@ -197,6 +215,8 @@ static void parser_next (parser *p) {
   p->type = 'o';
   if (p->symbol == NULL && *word == '=')
     parser_fail (p, p->at, "\"=\" would assign; equality is written ==");
+  else if (p->symbol == NULL && strncmp (word, "°", 2) == 0)
+    parser_fail (p, p->at, "degrees are written *deg: 30*deg");
   else if (p->symbol == NULL)
     parser_fail (p, p->at, "%s does not belong in an expression",
                  *word & 0x80 ? "a non-ASCII character" : (char[]){ '"', *word, '"', 0 });
@@ -270,10 +290,28 @@ static int parser_enter (parser *p) {
   return p->status == PW_OK;
 }
 
+/* Whether a name is a named number or a variable. */
+static int parser_knows (const parser *p, const char *name) {
+  int found = p->scope && pw_names_find (&p->scope->index, name) >= 0;
+  for (const char *const *v = p->variable; v && *v; v++) found |= strcmp (*v, name) == 0;
+  return found;
+}
+
+/* Reports an unexpected token after an operand; after a number, says what to write: "2*a", "30*deg". */
+static parser_part parser_no_operator (parser *p) {
+  char hint[PW_HINT] = "";
+  const char *number = p->text + p->previous,
+             *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
+  if (p->type == 'n' && number_size (number) && parser_knows (p, name))
+    pw_print (hint, sizeof hint, "; write %.*s*%s", (int)(p->previous_end - p->previous), number, name);
+  else if (p->type == 'n' && *pw_number_hint (number, hint, sizeof hint) == 0) /* "10 km/h", else "30deg*a" */
+    pw_number_hint (PW_PRINTED (200, "%.*s", (int)(p->at + p->size - p->previous), number), hint, sizeof hint);
+  return parser_fail (p, p->at, "an operator such as * is missing before \"%c\"%s", p->text[p->at], hint);
+}
+
 /* Reports an unexpected token.  open: a '(' or '?' at offset `at` that is not complete; 0 if there is none. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
-  if (p->type == 'n' || p->type == '0' || p->type == '(')
-    return parser_fail (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
+  if (p->type == 'n' || p->type == '0' || p->type == '(') return parser_no_operator (p);
   if (open == '?') return parser_fail (p, at, "there is no \":\" for this \"?\"");
   if (p->type == ',') return parser_fail (p, p->at, "a comma belongs between the arguments of a function");
   if (p->type == ')') return parser_fail (p, p->at, "there is no \"(\" for this \")\"");

@@ -2,6 +2,7 @@
 #ifndef PINWHEEL_FILES_H
 #define PINWHEEL_FILES_H
 
+#include <stdint.h>
 #include <stdio.h>
 #include "run.h"
 
@@ -100,6 +101,10 @@ int pw_read_number (const char *text, double *value);
 
 /* The same for numbers and expressions of numbers, as in text models: "30*deg", "2*pi/3". */
 int pw_read_expression (const char *text, double *value);
+
+/* For messages: what to write in place of a number with a unit, "; write 30*deg" for 30deg and "30 °"; "" for another
+ * text.  Returns the buffer. */
+char *pw_number_hint (const char *text, char *buffer, size_t size);
 
 /* ---- Formulas: expressions of named numbers, the same language (parser.c) ---- */
 
@@ -265,6 +270,8 @@ typedef struct {
 /* Adds an array of rows x columns numbers, row by row, or a vector if columns < 0; each number is 1 double, or 2 if it
  * is complex (parts).  The name has at most 300 bytes. */
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value);
+/* Adds a vector of texts, each of `width` > 0 Unicode characters, of which the last ones may be 0. */
+void pw_npz_add_texts (pw_npz *z, const char *name, long rows, int width, const uint32_t *character);
 /* Completes the archive and frees its memory, in every case.  PW_RESOURCE; errors of the stream are the caller's. */
 int pw_npz_end (pw_npz *z, pw_error *error);
 

@@ -128,7 +128,7 @@ int faults_run (const char *command) {
   fflush (NULL);
   int out = faults_redirect (1, "printed"), err = faults_redirect (2, "log");
   pw_stop = 0;
-  int status = pw_cli_main (faults_command (argv[0]), argc, argv);
+  int status = pw_cli_main (faults_command (argv[0]), NULL, argc, argv);
   fflush (NULL);
   faults_restore (out, 1);
   faults_restore (err, 2);

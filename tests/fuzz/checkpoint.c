@@ -59,7 +59,7 @@ static int checkpoint_command (int method, int resume) {
                          checkpoint_path,
                          resume ? NULL : "--checkpoint-every=0.01",
                          NULL };
-  return pw_cli_main (&pw_cli_run, resume ? 13 : 14, argv);
+  return pw_cli_main (&pw_cli_run, NULL, resume ? 13 : 14, argv);
 }
 
 /* What a run with a method writes, made once and kept. */

@@ -199,7 +199,8 @@ TEST (bad) {
     { "max:abs (wheel.phi)",
       "--of max:abs (wheel.phi): max: takes a column; for an expression, define an output of the model" },
     { "2*rms (wheel.phi)", "--of 2*rms (wheel.phi): write rms: and the column" },
-    { "max (wheel.phi)", "--of max (wheel.phi): too few arguments" },
+    { "max (wheel.phi)",
+      "--of max (wheel.phi): too few arguments; extrema over the run are max:COLUMN and min:COLUMN" },
     { "wheel.phi +", "--of wheel.phi +: something is missing after \"+\"" },
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

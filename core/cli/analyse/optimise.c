@@ -740,7 +740,8 @@ static int optimise_read (pw_optimise *problem, pw_error *error) {
     for (char *c = text; *c; c++)
       if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
     if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
-      return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", *given);
+      return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE%s", *given,
+                      symbol ? PW_NUMBER_HINT (symbol + 2) : "");
     problem->sign[i] = *symbol == '<' ? 1 : -1;
     *symbol = 0;
     while (symbol > text && symbol[-1] == ' ') *--symbol = 0;

@@ -56,9 +56,12 @@ static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
     cmd->settings.context = &cmd->vary;
     return PW_OK;
   }
-  if (strchr (cmd->vary.name, '.') == NULL && pw_system_find_state (cmd->line.m.system, cmd->vary.name, NULL) <
-                                                  0) /* no parameter: fails with the nearest name */
-    return pw_model_set (cmd->line.m.model, cmd->vary.name, cmd->settings.first, error);
+  pw_error held = { 0 }, parameter = { 0 };
+  if (strchr (cmd->vary.name, '.') == NULL && pw_system_find_held (cmd->line.m.system, cmd->vary.name, &held) < 0) {
+    pw_model_set (cmd->line.m.model, cmd->vary.name, cmd->settings.first, &parameter);
+    if (strstr (parameter.text, "did you mean") || !strstr (held.text, "did you mean")) held = parameter;
+    return pw_fail (error, held.status, "%s", held.text);
+  }
   cmd->settings.vary = cmd->settings.holds;
   int status = pw_hold_add (cmd->line.m.system, "--vary", cmd->vary_text, cmd->vary.name, cmd->settings.first,
                             cmd->hold, &cmd->settings.holds, error);

@@ -18,8 +18,8 @@ static int unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name,
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit ? u->parameter->unit : "");
     return PW_OK;
   }
-  if (strchr (name, '.') == NULL && pw_system_find_state (m->system, name, NULL) < 0) /* fails with the nearest name */
-    return pw_model_set (m->model, name, 0, error);
+  if (strchr (name, '.') == NULL && pw_system_find_state (m->system, name, NULL) < 0)
+    return pw_cli_no_parameter (m->file, m->model, name, 1, error);
   u->state = pw_system_find_state (m->system, name, error), u->low = -INFINITY;
   if (u->state < 0) return error->status;
   int n = pw_system_coordinates (m->system);

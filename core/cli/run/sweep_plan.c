@@ -45,7 +45,7 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *er
     const size_t size = pw_cli_part (c, ',');
     const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
     if (pw_read_expression (part, &axis->value[i]) != PW_OK || !isfinite (axis->value[i]))
-      return axis_fail (axis, PW_PRINTED (140, "\"%s\" is not a finite number", part), error);
+      return axis_fail (axis, PW_PRINTED (240, "\"%s\" is not a finite number%s", part, PW_NUMBER_HINT (part)), error);
   }
   return PW_OK;
 }
@@ -144,8 +144,9 @@ static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model,
     if (strncmp (*given, axis->name, n) == 0 && (*given)[n] == '=')
       return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
   if (parameter == NULL && pw_cli_is_state (plan->line->m.file, axis->name)) return PW_OK;
+  if (parameter == NULL) return pw_cli_no_parameter (plan->line->m.file, model, axis->name, 1, error);
   for (long i = 0; i < axis->count; i++)
-    if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
+    if (*pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
       return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
   return PW_OK;
 }

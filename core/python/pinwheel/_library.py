@@ -206,6 +206,7 @@ _declare(files, _p, ("pw_file_open", _s, _e), ("pw_file_model", _p, _e))
 _declare(files, _s, ("pw_file_name", _p))
 _declare(files, c.POINTER(pw_plugin_table), ("pw_file_table", _p))
 _declare(files, None, ("pw_file_close", _p))
+_declare(files, _s, ("pw_number_hint", _s, _s, _z))
 _declare(files, _i, ("pw_read_expression", _s, _double_p), ("pw_file_list", c.CFUNCTYPE(_i, _p, _s, _s), _p, _e))
 _declare(core, None, ("pw_model_free", _p), ("pw_system_free", _p), ("pw_run_close", _p), ("pw_linear_free", c.POINTER(pw_linear)))
 _declare(core, _i, ("pw_model_set", _p, _s, _d, _e), ("pw_model_build", _p, _e), ("pw_model_set_initial", _p, _s, _d, _e),
@@ -385,14 +386,15 @@ def encode(value, what: str) -> bytes:
 
 def number(value, what: str, above: float | None = None) -> float:
     """A number, or an expression of numbers ("30*deg"); with `above`, it must be finite and larger than that."""
-    result = c.c_double()
+    result, hint = c.c_double(), c.create_string_buffer(100)
     try:
         if not isinstance(value, str):
             result.value = float(value)
         elif files.pw_read_expression(encode(value, what), c.byref(result)) != PW_OK:
+            files.pw_number_hint(encode(value, what), hint, len(hint))
             raise ValueError
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} = {value!r:.60}: expected a number") from None
+        raise InputError(f"{what} = {value!r:.60}: expected a number{hint.value.decode()}") from None
     if above is not None and not above < result.value < float("inf"):
         raise InputError(f"{what} = {result.value!r}: expected a finite number > {above:g}")
     return result.value
