@@ -856,6 +856,7 @@ int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int s
 void pw_run_count_moved (pw_run *r) {
   pw_initial_report *report = &r->initial;
   report->moved = report->changed = report->rounded = 0;
+  report->q = r->q, report->v = r->v; /* a method that has been reopened since had lent them */
   report->time = r->w->scale.time;
   report->speed = 0;
   for (int j = 0; j < r->s->coords; j++)
