@@ -176,22 +176,3 @@ TEST (samples) {
   }
   runs_close (r, s);
 }
-
-/* Loaded runs continue like saved ones, bit for bit. */
-TEST (checkpoints) {
-  static const char *const scene[] = { "ball", "wall", "belt", "ride-on" };
-  for (int i = 0; i < 4; i++)
-    for (double t = 0.2; t < 1.5; t += 0.31) {
-      pw_system *s = runs_scene (scene[i], i == 3 ? "gA=0.008 gC=0.2" : "");
-      const pw_settings set = { .step = 1e-3, .span = 2 };
-      pw_run *saved = runs_open (s, "moreau", &set);
-      (void)runs_to (saved, t);
-      pw_run *loaded = runs_copy (saved, s, "moreau", &set);
-      pw_sample a = runs_to (saved, 2), b = runs_to (loaded, 2);
-      check_bits ("q", a.q, b.q, pw_system_coordinates (s));
-      check_bits ("v", a.v, b.v, pw_system_coordinates (s));
-      check_bits ("lambda", a.lambda, b.lambda, pw_system_rows (s));
-      pw_run_close (loaded);
-      runs_close (saved, s);
-    }
-}
