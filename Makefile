@@ -298,23 +298,34 @@ PYTHON_SITE = lib/$(if $(filter /usr,$(PREFIX)),python3/dist-packages,$(shell py
 
 define PKGCONFIG
 prefix=$(PREFIX)
-includedir=$${prefix}/include/pinwheel
+includedir=$${prefix}/include
 libdir=$${prefix}/lib
 modelsdir=$${libdir}/pinwheel/models
 
 Name: pinwheel
 Description: planar multibody systems with pin joints and knife-edge wheels
 Version: $(VERSION)
-Cflags: -I"$${includedir}"
+Cflags: -I"$${includedir}/pinwheel" -I"$${includedir}"
 Libs: -L"$${libdir}" -lpinwheel-files -lpinwheel
 Libs.private: $(FILES_LIBS) $(SOLVER_LIBS) $(STATIC_LIBS)
 endef
 export PKGCONFIG
 
+# A version that find_package of CMake asks for is met by the same minor version.
+define CMAKE_VERSION
+set (PACKAGE_VERSION $(VERSION))
+set (PACKAGE_VERSION_COMPATIBLE FALSE)
+if (PACKAGE_FIND_VERSION VERSION_LESS_EQUAL PACKAGE_VERSION AND
+    "$(VERSION)" MATCHES "^$${PACKAGE_FIND_VERSION_MAJOR}[.]$${PACKAGE_FIND_VERSION_MINOR}[.]")
+  set (PACKAGE_VERSION_COMPATIBLE TRUE)
+endif ()
+endef
+export CMAKE_VERSION
+
 share := share/doc/pinwheel
 
 install: all
-	install -d "$(D)/bin" "$(D)/lib/pinwheel/models" "$(D)/lib/pkgconfig" "$(D)/include/pinwheel" "$(D)/share/man/man1" \
+	install -d "$(D)/bin" "$(D)/lib/pinwheel/models" "$(D)/lib/pkgconfig" "$(D)/lib/cmake/pinwheel" "$(D)/include/pinwheel" "$(D)/share/man/man1" \
 	  "$(D)/share/man/man5" "$(D)/share/bash-completion/completions" "$(D)/share/zsh/site-functions" "$(D)/$(share)/docs/figures" "$(D)/$(share)/examples"
 	install $(PROGRAM) "$(D)/bin"
 	for l in libpinwheel libpinwheel-files; do \
@@ -332,6 +343,8 @@ install: all
 	for c in $$($(PROGRAM) --help | sed -n '/^Commands:/,/^$$/s/^  \([a-z]*\) .*/\1/p'); do \
 	  sh core/cli/man.sh $(PROGRAM) $$c >"$(D)/share/man/man1/pinwheel-$$c.1" || exit 1; done
 	echo "$$PKGCONFIG" >"$(D)/lib/pkgconfig/pinwheel.pc"
+	install -m 644 core/pinwheel-config.cmake "$(D)/lib/cmake/pinwheel"
+	echo "$$CMAKE_VERSION" >"$(D)/lib/cmake/pinwheel/pinwheel-config-version.cmake"
 	install -m 644 README.md "$(D)/$(share)"
 	install -m 644 $(filter docs/%,$(DOCS)) "$(D)/$(share)/docs"
 	install -m 644 $(FIGURES) "$(D)/$(share)/docs/figures"
@@ -340,11 +353,11 @@ install: all
 # Removes what install has installed, and directories that only Pinwheel uses, if they are empty.
 uninstall:
 	[ ! -d "$(D)" ] || { cd "$(D)" && rm -rf $(PYTHON_SITE)/pinwheel && rm -f bin/pinwheel share/bash-completion/completions/pinwheel share/zsh/site-functions/_pinwheel \
-	  lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
+	  lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc lib/cmake/pinwheel/pinwheel-config*.cmake \
 	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) $(addprefix lib/pinwheel/page/,$(notdir $(PAGE))) \
 	  share/man/man1/pinwheel-*.1 $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \
 	  $(addprefix $(share)/,$(DOCS) $(FIGURES)) $(addprefix $(share)/examples/,$(notdir $(EXAMPLES))) && \
-	  { rmdir include/pinwheel lib/pinwheel/models lib/pinwheel/page lib/pinwheel $(share)/docs/figures $(share)/docs $(share)/examples \
+	  { rmdir include/pinwheel lib/cmake/pinwheel lib/cmake lib/pinwheel/models lib/pinwheel/page lib/pinwheel $(share)/docs/figures $(share)/docs $(share)/examples \
 	    $(share) 2>/dev/null || true; }; }
 
 clean:

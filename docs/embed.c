@@ -3,7 +3,10 @@
  * with an installed Pinwheel:
  *     cc -std=c11 embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm
  * and, if the prefix is not searched by the system, with PKG_CONFIG_PATH=PREFIX/lib/pkgconfig in the environment and
- *     -Wl,-rpath,"$(pkg-config --variable=libdir pinwheel)" */
+ *     -Wl,-rpath,"$(pkg-config --variable=libdir pinwheel)"
+ * or by CMake, with -DCMAKE_PREFIX_PATH=PREFIX, from
+ *     find_package (pinwheel REQUIRED)
+ *     target_link_libraries (embed pinwheel::pinwheel) */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel-files.h"

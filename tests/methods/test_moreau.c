@@ -1,5 +1,5 @@
-/* moreau: orders with and without events, rest after an accumulation, simultaneous impacts, ledger, samples,
- * checkpoints. */
+/* moreau: orders with and without events, rest after an accumulation, simultaneous impacts, ledger, samples.  Its
+ * checkpoints: test_events.c. */
 #include <math.h>
 #include <string.h>
 #include "check.h"

@@ -107,6 +107,27 @@ EOF
   report 'a program in C++ that embeds them, with a compiled model and with one in C' $?
 fi
 
+# A project that finds the package; in C++ it includes a header by its folder.
+if command -v cmake >/dev/null && command -v c++ >/dev/null; then
+  mkdir "$work/project" && sed 's|"pinwheel-files.h"|<pinwheel/pinwheel-files.h>|' "$work/plus.cc" >"$work/project/plus.cc"
+  cp docs/embed.c "$work/project"
+  cat >"$work/project/CMakeLists.txt" <<'EOF'
+cmake_minimum_required (VERSION 3.10)
+project (plus)
+find_package (pinwheel 0.1 REQUIRED)
+foreach (name plus.cc embed.c)
+  add_executable (${name}.out ${name})
+  target_link_libraries (${name}.out pinwheel::pinwheel)
+endforeach ()
+EOF
+  (cd "$work/project" && cmake -DCMAKE_PREFIX_PATH="$top" . && cmake --build . && ./plus.cc.out && ./embed.c.out) >"$work/log" 2>&1
+  report 'a project of CMake in C and C++ that finds the package' $?
+  sed -i 's/pinwheel 0.1/pinwheel 0.2/' "$work/project/CMakeLists.txt"
+  (cd "$work/project" && cmake -DCMAKE_PREFIX_PATH="$top" .) >"$work/log" 2>&1
+  [ $? != 0 ] && grep -q 'version: 0.1.0' "$work/log"
+  report 'one that asks for another version is refused' $?
+fi
+
 # The files to which the pages link exist.
 for page in "$top/share/doc/pinwheel/"*.md "$top/share/doc/pinwheel/docs/"*.md; do
   grep -o '](\([^)#: ]*\)' "$page" | sed 's/^](//' | while read -r link; do
