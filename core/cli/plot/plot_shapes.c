@@ -144,6 +144,7 @@ static int shapes_link (const pw_plots *plots, const pw_element *e, int element,
     if (link->force_end >= link->ends) link->force_end = -1; /* the end that is not at the joint */
     return 1;
   }
+  if (shapes_without_points (e) && shapes_field (e->kind, e->definition, "what", 4) == PW_DRIVE_ANGLE) return 0;
   return link->force_end >= 0;
 }
 
