@@ -166,19 +166,9 @@ static double decision_step_on_circle (pw_decision *d, int k) {
   return change;
 }
 
-/* Solves a problem without friction of contacts, a convex minimum: projected gradients for circles (Goldstein 1964,
- * Convex programming in Hilbert space), alternating with pw_decision_pivot for the other equations. */
-static int decision_minimise (pw_decision *d) {
-  double before = INFINITY;
-  for (int pass = 0; pass < 10000; pass++) {
-    double change = 0;
-    const int status = pw_decision_pivot (d, 1);
-    for (int k = 0; k < d->n && status == PW_OK; k++)
-      if (d->limit[d->list[k]].circle == 1) change = fmax (change, decision_step_on_circle (d, k));
-    if (status != PW_OK || change == 0 || (change < 1e-12 && change >= before)) return status;
-    before = change;
-  }
-  return PW_RETRY;
+/* 1 for an equation whose mode is no choice of a combination: it slides, or is on a circle. */
+static int decision_stays (const pw_decision *d, int k) {
+  return d->fixed[k] || d->limit[d->list[k]].circle;
 }
 
 /* Sets the next combination of trial modes: 0, 1, -1 with two limits, as of friction; 0 and the limit with one.  0
@@ -186,7 +176,7 @@ static int decision_minimise (pw_decision *d) {
 static int decision_next_modes (pw_decision *d) {
   for (int k = 0; k < d->n; k++) {
     const signed char off = isinf (d->lo[k]) ? 1 : isinf (d->hi[k]) ? -1 : 0;
-    if (d->fixed[k] || (off == 0 && d->lo[k] == d->hi[k])) continue;
+    if (decision_stays (d, k) || (off == 0 && d->lo[k] == d->hi[k])) continue;
     const signed char now = d->trial[k];
     d->trial[k] = off ? (now ? 0 : off) : now == 0 ? 1 : now == 1 ? -1 : 0;
     if (d->trial[k]) return 1;
@@ -200,14 +190,14 @@ static int decision_next_modes (pw_decision *d) {
 static int decision_enumerate (pw_decision *d, int found, int *count) {
   const int n = d->n;
   double combinations = 1, *kept_z = d->choice, *kept_modes = kept_z + n;
-  for (int k = 0; k < n; k++) combinations *= d->fixed[k] ? 1 : isinf (d->lo[k]) || isinf (d->hi[k]) ? 2 : 3;
+  for (int k = 0; k < n; k++) combinations *= decision_stays (d, k) ? 1 : isinf (d->lo[k]) || isinf (d->hi[k]) ? 2 : 3;
   *count = -1;
   if (combinations > DECISION_MOST) return found ? PW_OK : PW_RETRY;
   *count = found;
   double size = 0; /* of z without x */
   for (int k = 0; k < n; k++) size = fmax (size, fabs (d->b[k]) / sqrt (d->A[k * n + k]));
   for (int k = 0; k < n && found; k++) kept_modes[k] = d->trial[k], kept_z[k] = pw_decision_z (d, k);
-  for (int k = 0; k < n; k++) d->trial[k] = d->fixed[k] ? d->trial[k] : 0;
+  for (int k = 0; k < n; k++) d->trial[k] = decision_stays (d, k) ? d->trial[k] : 0;
   do {
     int to, good, same = 1;
     decision_set_given (d);
@@ -225,15 +215,32 @@ static int decision_enumerate (pw_decision *d, int found, int *count) {
   return *count == 1 ? pw_decision_solve (d, 1) : PW_RETRY;
 }
 
-int pw_decide (pw_decision *d, int *count) {
-  int coupled = 0, circles = 0;
-  for (int k = 0; k < d->n; k++) coupled |= d->normal[k] >= 0, circles |= d->limit[d->list[k]].circle;
-  *count = coupled && circles ? PW_DECISION_MIXED : -1;
-  if (coupled && circles) return PW_RETRY;
+/* The first pass: from the present modes on, as friction requires; otherwise from all that hold on, so that multipliers
+ * are not larger than others that depend on them require. */
+static int decision_begin (pw_decision *d, int coupled, int *count) {
   int status = coupled ? pw_decision_pivot (d, 0) : PW_RETRY;
   for (int k = 0; k < d->n && status != PW_OK; k++)
     if (!d->fixed[k]) d->trial[k] = 0;
-  /* again, or from all that hold on, so that multipliers are not larger than others that depend on them require */
-  if (status != PW_OK) status = coupled ? pw_decision_pivot (d, 1) : decision_minimise (d);
+  if (status != PW_OK) status = pw_decision_pivot (d, 1);
   return coupled ? decision_enumerate (d, status == PW_OK, count) : status;
+}
+
+/* Projected gradients for circles (Goldstein 1964, Convex programming in Hilbert space) alternate with pivoting for the
+ * other equations. */
+int pw_decide (pw_decision *d, int *count) {
+  int coupled = 0, circles = 0;
+  for (int k = 0; k < d->n; k++) coupled |= d->normal[k] >= 0, circles |= d->limit[d->list[k]].circle;
+  *count = -1;
+  int status = decision_begin (d, coupled, count);
+  double before = INFINITY, change = circles ? INFINITY : 0;
+  for (int pass = 0; pass < 10000 && status == PW_OK && change != 0; pass++) {
+    if (pass > 0) status = pw_decision_pivot (d, 1);
+    if (status != PW_OK && coupled) status = decision_enumerate (d, 0, count);
+    before = change, change = 0;
+    for (int k = 0; k < d->n && status == PW_OK; k++)
+      if (d->limit[d->list[k]].circle == 1) change = fmax (change, decision_step_on_circle (d, k));
+    if (change < 1e-12 && change >= before) change = 0;
+  }
+  if (change != 0) return PW_RETRY;
+  return coupled && circles && status == PW_OK ? decision_enumerate (d, 1, count) : status;
 }

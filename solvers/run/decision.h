@@ -20,15 +20,13 @@ typedef struct {
   double *choice;           /* scratch of decision_enumerate: 2 n */
 } pw_decision;
 
-enum { PW_DECISION_MIXED = -2 }; /* no number of solutions: friction of contacts with circles, which is not solved */
-
 /* The sign of a multiplier that has one limit. */
 static inline int pw_limit_sign (const pw_bounds *limit) {
   return isinf (limit->least) ? -1 : 1;
 }
 
 /* Solves the problem, from the present trial modes on.  PW_RETRY if that fails.  *count: the number of solutions where
- * friction depends on reactions, 0, 1 or 2 (several); otherwise -1 (not known) or PW_DECISION_MIXED. */
+ * friction depends on reactions, 0, 1 or 2 (several); otherwise -1 (not known). */
 int pw_decide (pw_decision *d, int *count);
 
 /* Principal pivoting, from the present trial modes on: the equation of the largest violation changes its mode.  After

@@ -268,12 +268,10 @@ int pw_modes_fail (pw_run *r, pw_saddle *saddle, int count, pw_error *error) {
   if (saddle == NULL && error && error->status == PW_RESOURCE) return PW_RESOURCE;
   return pw_fail (error, PW_METHOD, "t = %.6g s: whether %s hold%s cannot be decided: %s", r->t, elements,
                   strchr (elements, ',') ? "" : "s",
-                  count == PW_DECISION_MIXED
-                      ? "friction of contacts together with grips of rolling wheels is not supported"
-                  : count == 0 ? "with this friction there is no solution (Painleve)"
-                  : count > 1  ? "with this friction there are several solutions (Painleve)"
-                  : saddle     ? "their equations depend on each other or on other constraints"
-                               : "without them the accelerations are not determined");
+                  count == 0  ? "with this friction there is no solution (Painleve)"
+                  : count > 1 ? "with this friction there are several solutions (Painleve)"
+                  : saddle    ? "their equations depend on each other or on other constraints"
+                              : "without them the accelerations are not determined");
 }
 
 /* Adds to the ledger what an impact dissipates and what constraints supply in it: impulses -x of D, x->lambda of the

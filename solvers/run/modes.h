@@ -106,7 +106,7 @@ void pw_modes_push (pw_run *r, pw_saddle *saddle, double *v);
 /* After pw_modes_push: u from the velocities v, and the ledger. */
 void pw_modes_end_impact (pw_run *r, const double *v);
 
-/* Fails with the equations of D.  count: of solutions, -1: not known, or PW_DECISION_MIXED. */
+/* Fails with the equations of D.  count: of solutions, -1: not known. */
 int pw_modes_fail (pw_run *r, pw_saddle *saddle, int count, pw_error *error);
 
 #endif
