@@ -46,6 +46,15 @@ TEST (limits) {
   assert_non_null (strstr (cli_file ("check.json"), "\"mode\": \"holds\", \"events\": 0, \"first\": null"));
   cli_good ("pinwheel check tests/models/events-pendulum.yaml");
   assert_non_null (strstr (cli_out, "free at the start; 6 events, the first at t = 0.713008 s"));
+  /* lateral force and traction have one limit together, of which a part says nothing; there is no brake */
+  cli_write ("rolls.yaml", "pinwheel: 1\nrun: {t_end: 1}\n"
+                           "bodies:\n  - {name: car, mass: 1, inertia: 1, rate: {vx: 1}}\n"
+                           "elements:\n  - {rolling-wheel: W, body: car, at: [0, 0], radius: 0.1, inertia: 0.01, "
+                           "grip: 5, torque: 0.1}\n");
+  cli_good ("pinwheel check @/rolls.yaml");
+  assert_non_null (strstr (cli_out, "W.N                                holds at the start; no events"));
+  assert_null (strstr (cli_out, "W.T  "));
+  assert_null (strstr (cli_out, "W.B  "));
 }
 
 TEST (spring) {

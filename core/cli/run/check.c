@@ -144,7 +144,7 @@ enum { CHECK_LIMIT_OUTPUTS = 4, CHECK_LIMIT_SECONDS = 10 /* of processor time */
 static void check_limit (const pw_outcomes *set, pw_checked_limit *l, int first) {
   const pw_bounds *bounds = pw_system_limits (set->system, l->row);
   l->first = pw_outcome_value (set, first + 2), l->events = pw_outcome_value (set, first + 3);
-  for (int side = 0; side < 2; side++) { /* reactions are -lambda */
+  for (int side = 0; side < 2 && !bounds->circle; side++) { /* reactions are -lambda; on a circle one is only a part */
     const pw_functional *f = &set->functional[set->outcome[first + side].term[0]];
     const double most = side ? bounds->most : bounds->least, used = -f->value / most;
     if (isfinite (most) && most != 0 && !(used <= l->used)) l->used = used, l->t = f->t;
@@ -162,7 +162,8 @@ static int check_limits (pw_check *check, pw_error *error) {
   check->limit = pw_arena_alloc (arena, ((size_t)n + 1) * sizeof *check->limit);
   if (text == NULL || check->limit == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int row = 0; row < pw_system_rows (s) && n > 0; row++) {
-    if (pw_system_limits (s, row) == NULL) continue;
+    const pw_bounds *bounds = pw_system_limits (s, row);
+    if (bounds == NULL || bounds->circle == 2 || bounds->least == bounds->most) continue; /* the last: no brake */
     for (int k = 0; k < CHECK_LIMIT_OUTPUTS; k++) {
       const char *name = PW_NAME (pw_system_reaction_name, s, row);
       const char **of = &text[CHECK_LIMIT_OUTPUTS * check->limits + k];
@@ -176,7 +177,7 @@ static int check_limits (pw_check *check, pw_error *error) {
   pw_settings settings;
   pw_limit seconds;
   pw_error own = { 0 };
-  int status = pw_outcomes_open (&set, s, "check", text, CHECK_LIMIT_OUTPUTS * n, NULL, error);
+  int status = pw_outcomes_open (&set, s, "check", text, CHECK_LIMIT_OUTPUTS * check->limits, NULL, error);
   if (status == PW_OK) status = pw_cli_settings (&check->line, &check->line.m.defaults, &settings, &seconds, error);
   seconds.seconds = CHECK_LIMIT_SECONDS;
   pw_limit_start (&seconds);
