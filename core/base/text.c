@@ -1,6 +1,7 @@
 /* External texts: UTF-8 without control characters, which could move a terminal's cursor; suggestions of names; domains
  * of numbers; streams into memory. */
 #define _GNU_SOURCE /* fopencookie, strcasecmp */
+#include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -79,13 +80,16 @@ static size_t nearest_distance (const char *a, const char *b) {
 }
 
 /* Two names are near if less than half of the longer one has to change, or exactly half where that is at most two
- * characters, or if one begins or ends with the other; a single character only if it follows a dot. */
+ * characters, or if one begins or ends with the other; a single character only beside a sign, as in body.y and u[0]. */
 static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
   const size_t longer = n > m ? n : m, shorter = n + m - longer;
-  const int begins = shorter > 1 && memcmp (a, b, shorter) == 0,
+  const char *name = n > m ? a : b;
+  const int begins = shorter > 0 && memcmp (a, b, shorter) == 0,
             ends = shorter > 0 && memcmp (a + n - shorter, b + m - shorter, shorter) == 0;
-  return 2 * distance < longer || (2 * distance == longer && distance <= 2) || begins ||
-         (ends && (shorter > 1 || (longer > 1 && (n > m ? a : b)[longer - 2] == '.')));
+  if (2 * distance < longer || (2 * distance == longer && distance <= 2)) return 1;
+  if (shorter > 1) return begins || ends;
+  return (begins && !isalnum ((unsigned char)name[1])) ||
+         (ends && longer > 1 && !isalnum ((unsigned char)name[longer - 2]));
 }
 
 static void nearest_append (pw_nearest *n, const char *candidate) {
