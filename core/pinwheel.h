@@ -775,7 +775,9 @@ struct pw_kind {
   pw_batch_function *eta;    /* rows: right-hand side of J v = eta; holonomic: minus the partial derivative of g by t */
   pw_batch_function *J;      /* rows x cols */
   pw_batch_function *gamma;  /* rows: right-hand side of J a = gamma */
-  pw_batch_function *force;  /* cols: generalised force */
+  /* J and gamma at once, with the same bits, where parts of them are common; may be NULL. */
+  void (*J_gamma) (const pw_batch *batch, double *J, double *gamma);
+  pw_batch_function *force;   /* cols: generalised force */
   pw_batch_function *force_u; /* cols x signals: derivative of the force with respect to the value of each signal */
   pw_batch_function *jw_q;    /* rows x cols: derivative of J w by q; with unit vectors w, that of J^T lambda */
   pw_batch_function *eta_q, *gamma_q, *gamma_v; /* rows x cols */

@@ -308,6 +308,11 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
   return r->method->stabilisations[r->stabilisation].kind == kind;
 }
 
+/* The scaled residual from which on constraints are lost. */
+static inline double pw_lost_residual (const pw_run *r) {
+  return pw_stabilised_by (r, PW_UNSTABILISED) ? r->thresholds.lost_unstabilised : r->thresholds.lost;
+}
+
 /* Stabilisations of methods that integrate the accelerations. */
 #define PW_ACCELERATION_STABILISATIONS                                                             \
   { "none", "accelerations only: the constraints drift", PW_UNSTABILISED }, {                      \
@@ -404,11 +409,16 @@ static inline int pw_fail_signal (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }
 
+/* Two numbers at once (GNU C), at any address of a double. */
+typedef double pw_pair __attribute__ ((vector_size (16), aligned (8), may_alias));
+#define PW_PAIR(x, i) (*(const pw_pair *)((x) + (i)))
+
 /* 1 if no number of a state is NaN, infinite, or so large (1e150) that its square nearly overflows. */
 static inline int pw_is_finite_state (const pw_run *r, const double *q, const double *v) {
-  double sum = 0;
-  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
-  return sum < 1e300;
+  const int n = r->s->coords;
+  pw_pair sum = { n % 2 ? q[n - 1] * q[n - 1] + v[n - 1] * v[n - 1] : 0 };
+  for (int j = 0; j + 1 < n; j += 2) sum += PW_PAIR (q, j) * PW_PAIR (q, j) + PW_PAIR (v, j) * PW_PAIR (v, j);
+  return sum[0] + sum[1] < 1e300;
 }
 
 /* Updates kinematics and evaluates J at a state; returns as pw_update_kinematics. */
@@ -418,20 +428,11 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
-/* Two numbers at once (GNU C), at any address of a double. */
-typedef double pw_pair __attribute__ ((vector_size (16), aligned (8), may_alias));
-#define PW_PAIR(x, i) (*(const pw_pair *)((x) + (i)))
-
 /* to += factor * from, two numbers at a time */
 static inline void pw_add_scaled (double *restrict to, const double *restrict from, double factor, int n) {
   int i = 0;
   for (; i + 1 < n; i += 2) *(pw_pair *)(to + i) = PW_PAIR (to, i) + factor * PW_PAIR (from, i);
   if (i < n) to[i] += factor * from[i];
-}
-
-/* The larger of two values; NaN if either is NaN, unlike pw_larger. */
-static inline double pw_larger_or_nan (double x, double y) {
-  return y > x || isnan (y) ? y : x;
 }
 
 /* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */
@@ -479,9 +480,17 @@ static inline double pw_energy (const pw_run *r, const double *v) {
 void pw_ledger_begin (pw_run *r);
 void pw_ledger_record (pw_run *r);
 
+/* pw_ledger_rates with integrals, or where multipliers are not unique. */
+void pw_ledger_all_rates (pw_run *r, const double *lambda, double *rate);
+
 /* Powers of the ledger's entries [W], and integrands, from the multipliers of the active rows, where kinematics are up
  * to date and J is evaluated.  Work is divided between redundant drives like their least-norm reactions. */
-void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
+static inline void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
+  if (r->redundant_drive || r->settings.integrals)
+    pw_ledger_all_rates (r, lambda, rate);
+  else
+    pw_evaluate_ledger (r->w, lambda, rate);
+}
 
 /* 1 if work, losses or integrals may depend on multipliers. */
 int pw_ledger_uses_multipliers (const pw_run *r);
@@ -510,6 +519,8 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
 
 /* The same, but factorises the saddle.  Returns as pw_run_accelerate, but does not set r->near_singular. */
 int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
+/* The same with gamma, evaluated with J, in the array of lambda. */
+int pw_run_accelerate_by_gamma (pw_run *r, const double *v, double *a, double *lambda);
 
 /* Makes the state reached the sample; updates kinematics and J there. */
 void pw_sample_reached (pw_run *r);

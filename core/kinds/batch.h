@@ -67,6 +67,16 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   }                                                                                                 \
   static inline void function##_one (type##_state now, double *out)
 
+/* J_GAMMA (rod, 6, 1) defines rod_J_gamma from rod_J and rod_gamma, which fill 6 numbers and 1. */
+#define J_GAMMA(type, size_J, size_gamma)                                                       \
+  FLATTEN static inline void type##_J_gamma (const pw_batch *batch, double *J, double *gamma) { \
+    for (int e = 0; e < batch->count; e++, J += size_J, gamma += size_gamma) {                  \
+      const type##_state now = type##_at (batch, e);                                            \
+      type##_J_one (now, J);                                                                    \
+      type##_gamma_one (now, gamma);                                                            \
+    }                                                                                           \
+  }
+
 /* PREPARE (gear_prepare, pw_gear, gear) { ... } defines a `prepare`: it fills `element`, a gear, from `definition`, a
  * pw_gear, may use its other parameters `bodies`, `internal` and `error`, and returns a status.  All members of a gear
  * are doubles, even a flag: specialised code for several runs copies the elements as arrays of doubles. */

@@ -68,6 +68,8 @@ PER_ELEMENT (contact_gamma, contact, 1) {
   *out = now.body->omega * (now.dy * now.body->vx - now.dx * now.body->vy);
 }
 
+J_GAMMA (contact, 3, 1)
+
 PER_ELEMENT (contact_jw_q, contact, 3) {
   out[0] = out[1] = 0, out[2] = now.dx * now.w[1] - now.dy * now.w[0];
 }

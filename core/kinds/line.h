@@ -75,6 +75,8 @@ PER_ELEMENT (line_gamma, line, 1) {
   *out = 2 * omega2 * tV + omega1 * (omega1 - 2 * omega2) * now.na + omega2 * omega2 * now.nD;
 }
 
+J_GAMMA (line, 6, 1)
+
 /* out = factor H w */
 static inline void line_multiply_H (const line_state *now, double factor, const double w[6], double *out) {
   out[0] = -factor * now->t[0] * w[5];

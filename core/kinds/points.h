@@ -63,6 +63,8 @@ PER_ELEMENT (points_gamma, points, 2) {
   out[1] = now.S1[1] * square1 - now.S2[1] * square2;
 }
 
+J_GAMMA (points, 12, 2)
+
 /* Sets the two angle columns of a 2 x 6 block, the others to zero. */
 static inline void points_angles (double *out, double x1, double y1, double x2, double y2) {
   for (int i = 0; i < 12; i++) out[i] = 0;

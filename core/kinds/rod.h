@@ -66,6 +66,8 @@ PER_ELEMENT (rod_gamma, rod, 1) {
   *out = (d_c - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
 }
 
+J_GAMMA (rod, 6, 1)
+
 /* ((D w)^T D + d^T (D w)_q) / L; the columns of (D w)_q: -(X1, Y1) w[2] for phi1, (X2, Y2) w[5] for phi2. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };

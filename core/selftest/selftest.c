@@ -18,6 +18,7 @@ static const struct {
   { "eta", "eta = -dg/dt" },
   { "g_size", "g_size >= |g|" },
   { "gamma", "J a - gamma = d(J v - eta)/dt" },
+  { "J_gamma", "J_gamma = J and gamma" },
   { "force_u", "force_u = d force/du" },
   { "J_u", "J_u = d J/du" },
   { "eta_u", "eta_u = d eta/du" },
@@ -281,6 +282,17 @@ static void selftest_gamma (probe *x) {
   selftest_compare (x, "gamma", x->rows, 1, size, value, reference);
 }
 
+static void selftest_J_gamma (probe *x) {
+  selftest_numbers J, gamma, both_J, both_gamma;
+  int rows = x->elements * x->rows, differences = 0;
+  probe_J (x, J);
+  probe_gamma (x, gamma);
+  x->kind->J_gamma (&x->batch->b, both_J, both_gamma);
+  for (int i = 0; i < rows * x->cols; i++) differences += J[i] != both_J[i];
+  for (int i = 0; i < rows; i++) differences += gamma[i] != both_gamma[i];
+  selftest_record (x->report, "J_gamma", differences, 0, "exact", "");
+}
+
 static void selftest_shift (probe *x, int u, double h) {
   for (int e = 0; e < x->elements; e++) *x->batch->source[e * x->kind->signals + u].u += h;
 }
@@ -491,6 +503,7 @@ static void selftest_all (probe *x) {
   probe_update (x, PROBE_TIME, 0);
   if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
   if (x->rows > 0) selftest_gamma (x);
+  if (x->kind->J_gamma) selftest_J_gamma (x);
   if (x->kind->signals > 0) selftest_signals (x);
   if (x->kind->constant) selftest_constant (x);
   selftest_blocks (x);

@@ -147,9 +147,11 @@ static int compile_sizes (const compilation *job) {
     size_t cols = (size_t)k->b.count * (size_t)k->b.cols, block = kind->saturation ? 2 * cols : cols;
     s->jacobian += (size_t)kind->rows * cols;
     if (s->block < block) s->block = block;
-    s->constraints += kind->rows > 0;
+    s->constraints += kind->rows > 0, s->positions += kind->rows > 0 && kind->level == PW_HOLONOMIC;
     s->rheonomic += kind->eta != NULL;
-    if (kind->force && !kind->constant && s->forces++ == 0) s->first_force = (int)(k - s->batch);
+    k->unrolled = kind->internal == 0 && kind->bodies <= 2 ? kind->bodies : 0;
+    k->adds_force = kind->force && !kind->constant;
+    if (k->adds_force && s->forces++ == 0) s->first_force = (int)(k - s->batch);
     s->saturates |= kind->saturation != NULL;
   }
   if (s->coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
@@ -541,10 +543,14 @@ static int compile_ledger (const compilation *job) {
   for (int impact = 0; impact < 2; impact++) {
     for (int i = 0; i < s->batches; i++) {
       const pw_element_batch *k = &s->batch[i];
-      for (int loss = 0; loss < 2; loss++)
+      for (int loss = 0; loss < 2; loss++) {
+        const int first = s->entries;
         for (int e = 0; e < k->b.count; e++)
           if (impact == (loss && !k->kind->loss) && (loss ? compile_has_loss (s, k, e) : compile_has_work (k, e)))
-            s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+            s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK, .whole = 0 };
+        const int whole = s->entries - first == k->b.count && (loss ? k->kind->loss : k->kind->power);
+        if (whole) s->entry[first].whole = k->b.count;
+      }
     }
     if (!impact) s->powers = s->entries;
   }

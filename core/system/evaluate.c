@@ -10,42 +10,56 @@ void pw_evaluate_J (pw_workspace *w) {
   PW_EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
-/* Fills an array over constraint equations by the function at this offset of each type's table; NULL gives zeros. */
-__attribute__ ((always_inline)) static inline void evaluate_rows (pw_workspace *w, size_t function, int rows,
-                                                                  double *out) {
-  PW_EACH_CONSTRAINT (k, w) {
-    if (k->row >= rows) break;
-    pw_batch_function *f = pw_kind_function (k->kind, function);
-    if (f)
-      f (&k->b, out + k->row);
-    else
-      for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) out[i] = 0;
-  }
+/* Fills the equations of a batch in an array over constraint equations; f NULL: zeros. */
+static inline void evaluate_batch_rows (const pw_element_batch *k, pw_batch_function *f, double *out) {
+  if (f)
+    f (&k->b, out + k->row);
+  else
+    for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) out[i] = 0;
+}
+
+/* Fills an array over constraint equations by the function at this offset of each type's table. */
+PW_INLINE void evaluate_rows (pw_workspace *w, size_t function, int batches, double *out) {
+  for (const pw_element_batch *k = w->batch, *end = k + batches; k < end; k++)
+    evaluate_batch_rows (k, pw_kind_function (k->kind, function), out);
 }
 
 void pw_evaluate_g (pw_workspace *w, double *g) {
-  evaluate_rows (w, offsetof (pw_kind, g), w->s->holonomic, g);
+  evaluate_rows (w, offsetof (pw_kind, g), w->s->positions, g);
 }
 
 void pw_evaluate_g_size (pw_workspace *w, double *size) {
-  evaluate_rows (w, offsetof (pw_kind, g_size), w->s->holonomic, size);
+  evaluate_rows (w, offsetof (pw_kind, g_size), w->s->positions, size);
   for (int i = 0; i < w->s->holonomic; i++) size[i] = pw_larger (size[i], w->scale.length);
 }
 
 void pw_evaluate_eta (pw_workspace *w, double *eta) {
-  evaluate_rows (w, offsetof (pw_kind, eta), w->s->rows, eta);
+  evaluate_rows (w, offsetof (pw_kind, eta), w->s->constraints, eta);
 }
 
 void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
-  evaluate_rows (w, offsetof (pw_kind, gamma), w->s->rows, gamma);
+  evaluate_rows (w, offsetof (pw_kind, gamma), w->s->constraints, gamma);
+}
+
+PW_SELDOM void evaluate_J_then_gamma (const pw_element_batch *k, double *gamma) {
+  k->kind->J (&k->b, k->J);
+  evaluate_batch_rows (k, k->kind->gamma, gamma);
+}
+
+void pw_evaluate_J_gamma (pw_workspace *w, double *gamma) {
+  PW_EACH_CONSTRAINT (k, w)
+    if (k->kind->J_gamma)
+      k->kind->J_gamma (&k->b, k->J, gamma + k->row);
+    else
+      evaluate_J_then_gamma (k, gamma);
 }
 
 /* Calls f (..., bodies, internal) for a batch, with constants for the commonest numbers, so that its loops over the
  * columns of an element are unrolled. */
-#define EVALUATE_UNROLLED(k, f, ...)                                                                          \
-  ((k)->kind->internal > 0 || (k)->kind->bodies > 2 ? f (__VA_ARGS__, (k)->kind->bodies, (k)->kind->internal) \
-   : (k)->kind->bodies == 2                         ? f (__VA_ARGS__, 2, 0)                                   \
-                                                    : f (__VA_ARGS__, 1, 0))
+#define EVALUATE_UNROLLED(k, f, ...)            \
+  ((k)->unrolled == 2   ? f (__VA_ARGS__, 2, 0) \
+   : (k)->unrolled == 1 ? f (__VA_ARGS__, 1, 0) \
+                        : f (__VA_ARGS__, (k)->kind->bodies, (k)->kind->internal))
 
 PW_INLINE void evaluate_add_blocks (const pw_element_batch *k, double *f, int bodies, int internal) {
   const double *block = k->block;
@@ -60,22 +74,20 @@ PW_INLINE void evaluate_add_blocks (const pw_element_batch *k, double *f, int bo
   }
 }
 
-PW_INLINE void evaluate_add_forces (const pw_workspace *w, int constant, double *f) {
-  const pw_element_batch *k = w->batch + (constant ? 0 : w->s->first_force), *end = w->batch + w->s->batches;
-  for (; k < end; k++) {
-    if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
-    k->kind->force (&k->b, k->block);
-    EVALUATE_UNROLLED (k, evaluate_add_blocks, k, f);
-  }
+PW_INLINE void evaluate_add_force (const pw_element_batch *k, double *f) {
+  k->kind->force (&k->b, k->block);
+  EVALUATE_UNROLLED (k, evaluate_add_blocks, k, f);
 }
 
 void pw_add_constant_forces (const pw_workspace *w, double *f) {
-  evaluate_add_forces (w, 1, f);
+  PW_EACH_BATCH (k, w)
+    if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
 }
 
 void pw_evaluate_force (pw_workspace *w, double *f) {
   memcpy (f, w->s->constant, (size_t)w->s->coords * sizeof *f);
-  evaluate_add_forces (w, 0, f);
+  for (const pw_element_batch *k = w->batch + w->s->first_force, *end = w->batch + w->s->batches; k < end; k++)
+    if (k->adds_force) evaluate_add_force (k, f);
 }
 
 double pw_potential (pw_workspace *w) {
@@ -94,21 +106,47 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
+/* out = J x for a batch; x NULL: the velocities of the workspace. */
+PW_INLINE void evaluate_J_x (const pw_element_batch *k, const pw_workspace *w, const double *x, double *out, int rows,
+                             int bodies, int internal) {
   static const double ground[3] = { 0, 0, 0 };
-  PW_EACH_CONSTRAINT (k, w) {
-    const double *J = k->J, *X[PW_MAX_BODIES], *y = x + k->internal; /* entries of x: of each body, internal */
-    const int bodies = k->kind->bodies, internal = k->kind->internal, *column = k->column;
-    for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
-      for (int n = 0; n < bodies; n++) X[n] = column[n] < w->s->coords ? x + column[n] : ground;
-      for (int r = 0; r < k->kind->rows; r++) {
-        double sum = 0;
-        for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * X[n][0] + J[1] * X[n][1] + J[2] * X[n][2];
-        for (int n = 0; n < internal; n++) sum += *J++ * y[n];
-        *out++ = sum;
+  const double *J = k->J, *X[PW_MAX_BODIES] = { NULL }, *y = x ? x + k->internal : k->b.v;
+  const int *column = k->column, *body = k->b.body, coords = w->s->coords;
+  for (int e = k->b.count; e > 0; e--, column += bodies, body += bodies, y += internal) {
+    PW_UNROLL for (int n = 0; n < bodies; n++) {
+      const double *velocity = &k->b.configuration[body[n]].vx; /* vx, vy, omega */
+      X[n] = x == NULL ? velocity : column[n] < coords ? x + column[n] : ground;
+    }
+    PW_UNROLL for (int r = 0; r < rows; r++) {
+      double sum = 0;
+      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
+        const double term = J[0] * X[n][0] + J[1] * X[n][1] + J[2] * X[n][2];
+        sum = n == 0 ? term : sum + term;
       }
+      for (int n = 0; n < internal; n++, J++) sum += *J * y[n];
+      *out++ = sum;
     }
   }
+}
+
+/* Calls it for all batches, with constants for the commonest types. */
+PW_INLINE void evaluate_J_all (const pw_workspace *w, const double *x, double *out) {
+  PW_EACH_CONSTRAINT (k, w) {
+    double *to = out + k->row;
+    const int rows = k->kind->rows;
+    if (k->unrolled == 2 && rows == 2)
+      evaluate_J_x (k, w, x, to, 2, 2, 0);
+    else if (k->unrolled == 1 && rows == 1)
+      evaluate_J_x (k, w, x, to, 1, 1, 0);
+    else if (k->unrolled == 2 && rows == 1)
+      evaluate_J_x (k, w, x, to, 1, 2, 0);
+    else
+      evaluate_J_x (k, w, x, to, rows, k->kind->bodies, k->kind->internal);
+  }
+}
+
+void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
+  evaluate_J_all (w, x, out);
 }
 
 void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
@@ -127,67 +165,74 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* Updates the largest scaled and absolute residual, and the constraint equation of the former.  NaN is the largest,
- * hence the negated comparisons. */
-static inline void evaluate_update_worst (int i, double residual, double size, double *scaled, double *largest,
-                                          int *row) {
-  double error = fabs (residual), ratio = error / size;
-  if (!(error <= *largest) && !isnan (*largest)) *largest = error;
+/* Updates the largest scaled residual and its constraint equation.  NaN is the largest, hence the negation. */
+static inline void evaluate_update_worst (int i, double ratio, double *scaled, int *row) {
   if (!(ratio <= *scaled) && !isnan (*scaled)) *scaled = ratio, *row = i;
 }
 
-void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
+/* The largest magnitude of enforced residuals; NaN if one is. */
+static double evaluate_largest (const double *residual, int rows, const unsigned char *enforced) {
+  double largest = 0, sum = 0; /* NaN if one is */
+  for (int i = 0; i < rows; i++) {
+    if (enforced && !enforced[i]) continue;
+    largest = pw_larger (fabs (residual[i]), largest);
+    sum += fabs (residual[i]);
+  }
+  return isnan (sum) ? NAN : largest;
+}
+
+void pw_worst_position (pw_workspace *w, const double *g, double *size, const unsigned char *enforced, double known,
                         pw_residuals *r) {
-  r->position = r->g = 0, r->row_position = -1;
-  for (int i = 0; i < s->holonomic; i++)
+  r->position = known, r->g = evaluate_largest (g, w->s->holonomic, enforced), r->row_position = -1;
+  if (r->g <= known * w->scale.length) return;
+  pw_evaluate_g_size (w, size);
+  for (int i = 0; i < w->s->holonomic; i++)
     if (enforced == NULL || enforced[i])
-      evaluate_update_worst (i, g[i], size[i], &r->position, &r->g, &r->row_position);
+      evaluate_update_worst (i, fabs (g[i]) / size[i], &r->position, &r->row_position);
 }
 
-/* Updates the worst residual J v - eta with a batch; eta NULL: zero; unit: L / T of a run. */
-PW_INLINE void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
-                                        double unit, pw_residuals *worst, int bodies, int internal) {
-  const double *J = k->J, *rate = k->b.v;
-  const pw_configuration *configuration = k->b.configuration;
-  const int *body = k->b.body;
-  for (int e = k->b.count, i = k->row; e > 0; e--, body += bodies, rate += internal)
-    for (const int end = i + k->kind->rows; i < end; i++) {
-      double sum = 0, size = unit;
-      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
-        const pw_configuration *p = configuration + body[n];
-        double x = J[0] * p->vx, y = J[1] * p->vy, phi = J[2] * p->omega; /* terms of J v */
-        sum += x + y + phi;
-        size += fabs (x) + fabs (y) + fabs (phi);
-      }
-      for (int n = 0; n < internal; n++) {
-        double term = *J++ * rate[n];
-        sum += term;
-        size += fabs (term);
-      }
-      if (eta) sum -= eta[i], size += fabs (eta[i]);
-      if (enforced == NULL || enforced[i])
-        evaluate_update_worst (i, sum, size, &worst->velocity, &worst->jv, &worst->row_velocity);
+/* Updates the worst scaled residual with those of a batch: the residual over the sum of L / T, the unit, and the
+ * magnitudes of the equation's terms; eta NULL: zero. */
+PW_SELDOM void evaluate_scale_velocities (const pw_element_batch *k, const double *residual, const double *eta,
+                                          const unsigned char *enforced, double unit, pw_residuals *r) {
+  const int bodies = k->kind->bodies, internal = k->kind->internal, rows = k->kind->rows;
+  for (int n = 0, i = k->row; n < k->b.count * rows; n++, i++) {
+    const int e = n / rows;
+    const double *J = k->J + n * k->b.cols, error = fabs (residual[i]);
+    double size = unit;
+    if ((enforced && !enforced[i]) || error <= r->velocity * unit) continue;
+    for (int m = 0; m < bodies; m++, J += 3) {
+      const pw_configuration *p = &k->b.configuration[k->b.body[e * bodies + m]];
+      size += fabs (J[0] * p->vx) + fabs (J[1] * p->vy) + fabs (J[2] * p->omega);
     }
+    for (int m = 0; m < internal; m++) size += fabs (J[m] * k->b.v[e * internal + m]);
+    if (eta) size += fabs (eta[i]);
+    evaluate_update_worst (i, error / size, &r->velocity, &r->row_velocity);
+  }
 }
 
-void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
-  double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
-  pw_residuals worst = { .row_velocity = -1 };
-  if (eta) pw_evaluate_eta (w, eta);
-  PW_EACH_CONSTRAINT (k, w) EVALUATE_UNROLLED (k, evaluate_worst_velocity, k, eta, enforced, unit, &worst);
-  r->velocity = worst.velocity, r->jv = worst.jv, r->row_velocity = worst.row_velocity;
+void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, double known, pw_residuals *r) {
+  double *value = w->scratch, *eta = w->s->rheonomic ? value + w->s->rows : NULL,
+         unit = w->scale.length / w->scale.time;
+  evaluate_J_all (w, NULL, value);
+  if (eta) {
+    pw_evaluate_eta (w, eta);
+    for (int i = 0; i < w->s->rows; i++) value[i] -= eta[i];
+  }
+  r->velocity = known, r->jv = evaluate_largest (value, w->s->rows, enforced), r->row_velocity = -1;
+  if (r->jv <= known * unit) return;
+  PW_EACH_CONSTRAINT (k, w) evaluate_scale_velocities (k, value, eta, enforced, unit, r);
 }
 
-void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, double known, pw_residuals *r) {
   double *value = w->scratch, *size = value + w->s->rows;
   pw_evaluate_g (w, value);
-  pw_evaluate_g_size (w, size);
-  pw_worst_position (w->s, value, size, enforced, r);
+  pw_worst_position (w, value, size, enforced, known, r);
 }
 
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
-  pw_evaluate_position_residual (w, enforced, r);
-  pw_evaluate_velocity_residual (w, enforced, r);
+  pw_evaluate_position_residual (w, enforced, 0, r);
+  pw_evaluate_velocity_residual (w, enforced, 0, r);
 }
 
 /* ---- Kinematics ---- */
@@ -265,7 +310,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
   update_configurations (w, q, v);
-  return pw_update_signals (w, t, q, v);
+  return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : pw_update_signals (w, t, q, v);
 }
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
@@ -636,21 +681,24 @@ int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
 /* ---- The ledger ---- */
 
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
-  const pw_entry *last = NULL;
-  double *eta = w->scratch;
-  for (int i = 0; i < w->s->powers; i++) {
-    const pw_entry *entry = &w->s->entry[i];
-    pw_element_batch *k = &w->batch[entry->batch];
-    pw_batch_function *power = entry->type == PW_WORK ? k->kind->power : k->kind->loss; /* NULL: by eta */
-    if (last == NULL || entry->batch != last->batch || entry->type != last->type) {
-      k->b.lambda = lambda + k->row;
-      (power ? power : k->kind->eta) (&k->b, power ? k->block : eta);
+  for (const pw_entry *entry = w->s->entry, *end = entry + w->s->powers; entry < end;) {
+    const pw_entry *first = entry;
+    pw_element_batch *k = &w->batch[first->batch];
+    pw_batch_function *power = first->type == PW_WORK ? k->kind->power : k->kind->loss; /* NULL: by eta */
+    k->b.lambda = lambda + k->row;
+    if (first->whole > 0) {
+      power (&k->b, rate);
+      entry += first->whole, rate += first->whole;
+      continue;
     }
-    last = entry;
-    rate[i] = power ? k->block[entry->element] : 0;
-    if (power) continue;
-    for (int r = 0, n = k->kind->rows; r < n; r++) /* the constraint force -J^T lambda has the power -lambda . J v */
-      rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
+    double *value = power ? k->block : w->scratch;
+    (power ? power : k->kind->eta) (&k->b, value);
+    for (; entry < end && entry->batch == first->batch && entry->type == first->type; entry++, rate++) {
+      const int rows = k->kind->rows, i = entry->element * rows;
+      *rate = power ? value[entry->element] : 0;
+      for (int r = i; r < i + rows && !power; r++) /* the constraint force -J^T lambda has the power -lambda . J v */
+        *rate -= k->b.lambda[r] * value[r];
+    }
   }
 }
 

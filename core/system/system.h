@@ -30,6 +30,8 @@ typedef struct {
 typedef struct {
   pw_batch b; /* the argument of the type's functions */
   const pw_kind *kind;
+  int unrolled;      /* bodies of an element, 1 or 2, without internal coordinates; else 0 */
+  int adds_force;    /* 1: it has a force that is not constant */
   int row;           /* global index of its first constraint equation */
   int internal;      /* global index of its first internal coordinate */
   int *column;       /* count x bodies: first coordinate of each body; s->coords for the ground */
@@ -43,6 +45,7 @@ typedef struct {
 typedef struct {
   int batch, element;
   enum { PW_WORK, PW_LOSS } type;
+  int whole; /* entries from this one on if they are those of the whole batch, by a function of its type; else 0 */
 } pw_entry;
 
 /* A limit that varies: its element and field. */
@@ -66,7 +69,7 @@ struct pw_system {
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
   int mechanical;                /* coordinates but those of first-order states (state.c), which are the last ones */
-  int constraints;               /* batches with constraint equations */
+  int constraints, positions;    /* batches with constraint equations; with holonomic ones, which come first */
   int forces, first_force;       /* batches with a force that is not constant; the first one */
   int saturates;                 /* 1: some of these have a function `saturation` */
   int sources;                   /* signals */
@@ -171,6 +174,11 @@ static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
 }
 
+/* The larger of two values; NaN if either is NaN. */
+static inline double pw_larger_or_nan (double x, double y) {
+  return y > x || isnan (y) ? y : x;
+}
+
 /* 1 if the multiplier of a constraint equation has a finite limit. */
 static inline int pw_is_limited (const pw_system *s, int row) {
   const pw_bounds *x = s->limit ? &s->limit[row] : NULL;
@@ -256,7 +264,8 @@ void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
 void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic, in units of g; at least L, for angles L rad */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
-void pw_evaluate_force (pw_workspace *w, double *f); /* constant forces included */
+void pw_evaluate_J_gamma (pw_workspace *w, double *gamma); /* both */
+void pw_evaluate_force (pw_workspace *w, double *f);       /* constant forces included */
 void pw_add_constant_forces (const pw_workspace *w, double *f);
 /* 2 coords: the smallest change of each state that reverses a saturating force or changes it by its own magnitude;
  * INFINITY if there is none. */
@@ -287,11 +296,12 @@ typedef struct {
 } pw_residuals;
 /* At the kinematics and J of the workspace; only equations with enforced[i] != 0, unless enforced is NULL. */
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
-void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r); /* g = 0 only */
-/* J v = eta only */
-void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
-/* Sets the position part of r from given g and sizes. */
-void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
+/* g = 0 only, J v = eta only.  A scaled residual below `known`, the largest so far, need not be computed: it becomes
+ * `known`. */
+void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, double known, pw_residuals *r);
+void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, double known, pw_residuals *r);
+/* The position part from a given g; size: scratch. */
+void pw_worst_position (pw_workspace *w, const double *g, double *size, const unsigned char *enforced, double known,
                         pw_residuals *r);
 
 /* The first time after t at which a step must end because of a signal, or INFINITY; kinks (pw_signal_breakpoint): only

@@ -628,102 +628,6 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
   block_accelerations (l, f, y, a);
 }
 
-/* ---- Dense matrices ----
- *
- *   c_j = S_ij - sum_{k < j} c_k L_jk,   L_ij = c_j / d_j,   d_i = S_ii - sum_{k < i} c_k L_ik
- *
- * (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.2), with n, the number of rows, constant where these
- * functions are inlined, so that all loops over rows are unrolled. */
-
-/* S += J W^-1 J^T, if `factors`, and y += J W^-1 f, if `solves`, for a group.  With n = 1 a group has one row. */
-PW_INLINE void dense_assemble (int width, const pw_dense_group *p, int n, int factors, int solves, const double *w,
-                               const double *f, double *S, double *y) {
-  const pw_dense_row *row = p->row, *end = row + (n == 1 ? 1 : p->rows);
-  do {
-    const block_row R = block_weigh (width, row->J, w + p->j);
-    const int i = n == 1 ? 0 : row->i;
-    if (solves) y[i] += block_product (width, R, f + p->j);
-    for (const pw_dense_row *other = p->row; factors && other <= row; other++)
-      S[n == 1 ? 0 : i * n + other->i] += block_product (width, R, other->J);
-  } while (++row < end);
-}
-
-/* L and D of S */
-PW_INLINE void dense_factor (int n, pw_block_ldl *l, const double *S) {
-  pw_dense *d = l->dense;
-  double L[PW_DENSE * PW_DENSE], c[PW_DENSE];
-  l->least_pivot = INFINITY;
-  l->least_unknown = -1;
-  PW_UNROLL for (int i = 0; i < n; i++) {
-    double pivot = S[i * n + i];
-    PW_UNROLL for (int j = 0; j < i; j++) {
-      c[j] = S[i * n + j];
-      PW_UNROLL for (int k = 0; k < j; k++) c[j] -= c[k] * L[j * n + k];
-    }
-    PW_UNROLL for (int j = 0; j < i; j++) {
-      d->L[i * n + j] = L[i * n + j] = c[j] * L[j * n + j];
-      pivot -= c[j] * L[i * n + j];
-    }
-    block_track_pivot (l, pivot, S[i * n + i], d->unknown[i]);
-    d->L[i * n + i] = L[i * n + i] = 1 / pivot;
-  }
-}
-
-/* a = W^-1 (f - J^T y) for a group. */
-PW_INLINE void dense_accelerate (int width, const pw_dense_group *p, const double *w, const double *f, const double *y,
-                                 double *a) {
-  double z[3] = { 0 };
-  PW_UNROLL for (int k = 0; k < width && f; k++) z[k] = f[p->j + k];
-  for (int r = 0; r < p->rows; r++) PW_UNROLL for (int k = 0; k < width; k++) z[k] -= p->row[r].J[k] * y[p->row[r].i];
-  PW_UNROLL for (int k = 0; k < width; k++) a[p->j + k] = w[p->j + k] * z[k];
-}
-
-PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) {
-  const pw_dense *d = l->dense;
-  const double *w = l->inverse_weight;
-  double S[PW_DENSE * PW_DENSE], y[PW_DENSE];
-  if (lambda) PW_UNROLL for (int i = 0; i < n; i++) y[i] = -lambda[d->unknown[i]];
-  if (factors) PW_UNROLL for (int i = 0; i < n; i++) PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
-  for (const pw_dense_group *p = d->group, *end = p + d->coupled; (factors || f) && p < end; p++)
-    if (!f)
-      BLOCK_WIDTH (p->width, dense_assemble, p, n, 1, 0, w, f, S, y);
-    else if (!factors)
-      BLOCK_WIDTH (p->width, dense_assemble, p, n, 0, 1, w, f, S, y);
-    else
-      BLOCK_WIDTH (p->width, dense_assemble, p, n, 1, 1, w, f, S, y);
-  if (factors && n > 2 && d->padded) S[n * n - 1] = 1;
-  if (factors) dense_factor (n, l, S);
-  if (lambda == NULL) return;
-  PW_UNROLL for (int i = 1; i < n; i++) PW_UNROLL for (int j = 0; j < i; j++) y[i] -= d->L[i * n + j] * y[j];
-  PW_UNROLL for (int i = 0; i < n; i++) y[i] *= d->L[i * n + i];
-  PW_UNROLL for (int i = n - 1; i >= 0; i--) {
-    lambda[d->unknown[i]] = y[i];
-    PW_UNROLL for (int j = 0; j < i; j++) y[j] -= d->L[i * n + j] * y[i];
-  }
-  for (const pw_dense_group *p = d->group; p < d->group + d->groups; p++)
-    BLOCK_WIDTH (p->width, dense_accelerate, p, l->inverse_weight, f, y, a);
-}
-
-#define DENSE_RUN(n)                                                                                     \
-  static void dense_run_##n (pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) { \
-    dense_run (n, l, factors, f, lambda, a);                                                             \
-  }
-
-DENSE_RUN (0)
-DENSE_RUN (1)
-DENSE_RUN (2)
-DENSE_RUN (4)
-DENSE_RUN (6)
-DENSE_RUN (8)
-DENSE_RUN (10)
-
-void pw_dense_run (pw_block_ldl *l, int factors, const double *f, double *y, double *a) {
-  static void (*const run[]) (pw_block_ldl *, int, const double *, double *,
-                              double *) = { [0] = dense_run_0, [1] = dense_run_1, [2] = dense_run_2,  [4] = dense_run_4,
-                                            [6] = dense_run_6, [8] = dense_run_8, [10] = dense_run_10 };
-  run[l->dense->n](l, factors, f, y, a);
-}
-
 /* ---- Elimination order ---- */
 
 typedef struct {
@@ -786,7 +690,6 @@ static int order_pass (const order_search *x, int most, int *below) {
 
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
-  free (l->dense);
   free (l->cursor);
   free (l->target);
   free (l->value);

@@ -32,7 +32,6 @@
 #include "util.h"
 
 enum {
-  PW_DENSE = 10,       /* most equations of a dense S */
   PW_BLOCK_NODE = 2,   /* most unknowns in a node */
   PW_BLOCK_RANKS = 3,  /* ranks of nodes: nodes of a lower rank are eliminated first */
   PW_BLOCK_LISTED = 64 /* most rows below the diagonal of a column whose targets are stored: n (n - 1) / 2 for n rows */
@@ -80,28 +79,6 @@ typedef struct {
   int includes_last; /* 1: the last pin is eliminated with the chain; 0: it only receives the update by the others */
 } pw_chain;
 
-/* A row of the dense matrix with its entries in the columns of a group. */
-typedef struct {
-  const double *J;
-  int i;
-} pw_dense_row;
-
-typedef struct {
-  int j, width; /* first coordinate; columns */
-  int rows;
-  pw_dense_row row[PW_DENSE]; /* rows, ascending */
-} pw_dense_group;
-
-/* S of a scene of few equations.  A matrix of an odd number of rows, 3 or more, has one more, that of the unit matrix,
- * with the unknown of the first row, which is stored after it. */
-typedef struct {
-  int n, padded;                 /* rows; 1: the last one is that of the unit matrix */
-  int groups, coupled;           /* all; those that have rows, which come first */
-  int unknown[PW_DENSE];         /* of each row: index in y */
-  double L[PW_DENSE * PW_DENSE]; /* n x n: L below the diagonal, D^-1 on it */
-  pw_dense_group group[];
-} pw_dense;
-
 typedef struct pw_block_ldl {
   int nodes;
   pw_block_column *column; /* nodes + 1: the last one ends the ranges */
@@ -118,7 +95,6 @@ typedef struct pw_block_ldl {
   pw_chain *chain;      /* chains + 1, by ascending columns, the last one a sentinel; their bodies have no block */
   double *chain_factor; /* factors of D in the chains' columns */
   int groups;
-  pw_dense *dense;        /* in place of everything above but inverse_weight; NULL: S is sparse */
   double least_pivot;     /* smallest pivot of the last factorisation over its diagonal entry before elimination */
   int least_unknown;      /* index in y of its unknown; -1: there is none */
   char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
@@ -161,7 +137,5 @@ void pw_block_factor (pw_block_ldl *l);
 /* y, which holds gamma, then 0 for each -a_k, becomes lambda and -a_k; a = W^-1 (f - J^T lambda).  f and a may be the
  * same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
-/* The same for a dense matrix: factorises it, if `factors`, whatever least_pivot is, and solves unless y is NULL. */
-void pw_dense_run (pw_block_ldl *l, int factors, const double *f, double *y, double *a);
 
 #endif

@@ -31,6 +31,7 @@
 #include <string.h>
 #include "saddle.h"
 #include "block_ldl.h"
+#include "dense.h"
 #include "util.h"
 
 /* A pivot is 1 minus a squared cosine.  Round-off leaves the pivot of a dependent row at about eps / s^2, with s the
@@ -238,6 +239,21 @@ static void massless_list (pw_component *c) {
   }
 }
 
+/* Lists the matched rows as known ones of a dense S, which applies them to forces and accelerations. */
+static void massless_list_known (pw_saddle *saddle) {
+  pw_dense *d = saddle->dense;
+  pw_dense_known *known = d->known;
+  for (pw_dense_group *p = d->group; p < d->group + d->groups; p++) {
+    p->known = known;
+    for (pw_component *c = saddle->component; c < saddle->component + saddle->components; c++)
+      for (int g = 0; g < c->groups; g++)
+        for (massless_row *r = c->row; r < c->row + c->pivots && c->group[g].j == p->j; r++)
+          if (r->source[g] != massless_zeros) *known++ = (pw_dense_known){ r->source[g], &r->lambda, &r->gamma };
+    p->known_rows = (int)(known - p->known);
+  }
+  pw_dense_open (d);
+}
+
 /* Matches the massless coordinates to rows at the J last evaluated, by Gaussian elimination with complete pivoting over
  * their columns.  Returns the number of rows matched. */
 static int massless_match (pw_component *c) {
@@ -332,8 +348,10 @@ PW_SELDOM void massless_unmatched (int n, pw_component *c) {
 }
 
 /* If `factors`, eliminates with the J last evaluated and the pivots matched before, and returns 0 if a pivot has become
- * much smaller than when it was matched.  Then, unless gamma is NULL: gamma~, mu, f~. */
-PW_INLINE int massless_forward (int n, pw_component *c, int factors, double *f, double *gamma) {
+ * much smaller than when it was matched.  Then, unless gamma is NULL: gamma~, mu and, unless S is dense, f~ in
+ * `force`. */
+PW_INLINE int massless_forward (int n, pw_component *c, int factors, int dense, const double *f, double *force,
+                                double *gamma) {
   massless_row *row = c->row;
   double local[MASSLESS_LOCAL * MASSLESS_LOCAL], local_mu[MASSLESS_LOCAL];
   double *P = n <= MASSLESS_LOCAL ? local : c->P, *mu = n <= MASSLESS_LOCAL ? local_mu : c->x;
@@ -353,8 +371,8 @@ PW_INLINE int massless_forward (int n, pw_component *c, int factors, double *f, 
   for (int i = n; i < c->rows; i++)
     if (c->unknown[i] >= 0) gamma[c->unknown[i]] = row[i].gamma;
   massless_solve_PT (n, P, mu);
-  for (const massless_block *b = c->block, *end = b + c->blocks; b < end; b++) {
-    double *F = f + b->j, x = mu[b->p];
+  for (const massless_block *b = c->block, *end = b + c->blocks; b < end && !dense; b++) {
+    double *F = force + b->j, x = mu[b->p];
     F[0] -= b->J[0] * x;
     if (b->width == 3) F[1] -= b->J[1] * x, F[2] -= b->J[2] * x;
   }
@@ -362,35 +380,38 @@ PW_INLINE int massless_forward (int n, pw_component *c, int factors, double *f, 
   return 1;
 }
 
-PW_SELDOM int massless_forward_any (pw_component *c, int factors, double *f, double *gamma) {
-  return massless_forward (c->pivots, c, factors, f, gamma);
+PW_SELDOM int massless_forward_any (pw_component *c, int factors, int dense, const double *f, double *force,
+                                    double *gamma) {
+  return massless_forward (c->pivots, c, factors, dense, f, force, gamma);
 }
 
 /* If `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it
- * was matched.  Then, unless gamma is NULL, does the first half of a solution: saddle->force becomes f~ at the massive
- * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least `least_pivot`, at
- * most 1; 0 if singular. */
-PW_INLINE double massless_forward_all (pw_saddle *saddle, int factors, double *gamma) {
+ * was matched.  Then, unless gamma is NULL, does the first half of a solution: unless S is dense, saddle->force becomes
+ * f~ at the massive coordinates; gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least
+ * `least_pivot`, at most 1; 0 if singular. */
+PW_INLINE double massless_forward_all (pw_saddle *saddle, int factors, int dense, const double *f, double *gamma) {
   double least = 1;
   pw_component *c = saddle->component, *end = c + saddle->components;
   for (int matched = 0; c < end;) {
-    if (MASSLESS_PIVOTS (massless_forward, c, factors, saddle->force, gamma)) {
+    if (MASSLESS_PIVOTS (massless_forward, c, factors, dense, f, saddle->force, gamma)) {
       if (!(c->least_pivot > 0)) return 0; /* or NaN */
       least = c->least_pivot < least ? c->least_pivot : least;
       c++, matched = 0;
     } else if (matched++ || massless_match (c) < c->pivots) {
       return 0;
+    } else if (dense) {
+      massless_list_known (saddle);
     }
   }
   return least * least;
 }
 
-/* gamma_p - H a, a_P, lambda_p.  a is 0 at massless coordinates. */
-PW_INLINE void massless_backward_component (int n, pw_component *c, double *a, double *lambda) {
+/* gamma_p - H a, which a dense S has computed, a_P, lambda_p.  a is 0 at massless coordinates. */
+PW_INLINE void massless_backward_component (int n, pw_component *c, int dense, double *a, double *lambda) {
   massless_row *row = c->row;
   double local[MASSLESS_LOCAL], *x = n <= MASSLESS_LOCAL ? local : c->x;
   PW_UNROLL for (int p = 0; p < n; p++) x[p] = row[p].gamma;
-  for (const massless_block *b = c->block, *end = b + c->blocks; b < end; b++) {
+  for (const massless_block *b = c->block, *end = b + c->blocks; b < end && !dense; b++) {
     const double *A = a + b->j;
     x[b->p] -= b->width == 3 ? b->J[0] * A[0] + b->J[1] * A[1] + b->J[2] * A[2] : b->J[0] * A[0];
   }
@@ -404,16 +425,16 @@ PW_INLINE void massless_backward_component (int n, pw_component *c, double *a, d
   PW_UNROLL for (int p = 0; p < n; p++) a[row[p].j] = x[p], lambda[row[p].equation] = row[p].lambda;
 }
 
-PW_SELDOM void massless_backward_component_any (pw_component *c, double *a, double *lambda) {
-  massless_backward_component (c->pivots, c, a, lambda);
+PW_SELDOM void massless_backward_component_any (pw_component *c, int dense, double *a, double *lambda) {
+  massless_backward_component (c->pivots, c, dense, a, lambda);
 }
 
 /* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
  * coordinates and lambda of all rows. */
-PW_INLINE void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
+PW_INLINE void massless_backward (pw_saddle *saddle, int dense, double *a, double *lambda) {
   pw_component *c = saddle->component;
   for (int count = saddle->components; count > 0; count--, c++)
-    MASSLESS_PIVOTS (massless_backward_component, c, a, lambda);
+    MASSLESS_PIVOTS (massless_backward_component, c, dense, a, lambda);
 }
 
 /* ---- Components, by union-find over the groups that contain massless coordinates, here called massless groups ---- */
@@ -556,7 +577,7 @@ static int massless_check (const saddle_plan *p, pw_component *c, pw_error *erro
     for (int q = 0; q < found; q++) used |= c->row[q].pivot_column == n;
     if (c->is_massless[n] && !used) return massless_undetermined (s, c->global[n], error);
   }
-  massless_forward_any (c, 1, NULL, NULL);
+  massless_forward_any (c, 1, 0, NULL, NULL, NULL);
   return PW_OK;
 }
 
@@ -1000,6 +1021,14 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
+/* The number of rows of massless components that may have entries in the columns of group g. */
+static int condense_known_rows (const saddle_plan *plan, int g) {
+  int rows = 0;
+  for (const pw_component *c = plan->saddle->component, *end = c + plan->saddle->components; c < end; c++)
+    for (int i = 0; i < c->groups; i++) rows += c->group[i].j == group_first (plan->saddle->s, g) ? c->rows : 0;
+  return rows;
+}
+
 /* Appends group g to a dense matrix, unless it is massless; first: row of each node. */
 static void condense_dense_group (const saddle_plan *plan, pw_dense *d, int g, const int *first) {
   const int j = group_first (plan->saddle->s, g), width = group_width (plan->saddle->s, j);
@@ -1008,34 +1037,44 @@ static void condense_dense_group (const saddle_plan *plan, pw_dense *d, int g, c
   if (!has_weight) return;
   pw_dense_group *group = &d->group[d->groups++];
   group->j = j, group->width = width;
-  for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
-    const plan_contribution *a = &plan->contribution[plan->list[x]];
-    for (int i = 0; i < plan->node[a->node].size; i++) {
-      group->row[group->rows].J = a->J + i * a->row_stride;
-      group->row[group->rows++].i = first[a->node] + i;
+  for (int pins = 1, at = 0; pins >= 0; pins--)
+    for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
+      const plan_contribution *a = &plan->contribution[plan->list[x]];
+      for (int i = 0; i < plan->node[a->node].size && a->is_pin == pins; i++) {
+        const int row = first[a->node] + i, r = group->rows++;
+        group->pins += pins && i == 0;
+        group->J[r] = a->J + i * a->row_stride;
+        group->row[r] = (unsigned char)row;
+        for (int q = 0; q <= r; q++) {
+          const int with = group->row[q];
+          group->at[at++] = (unsigned char)(row > with ? row * d->n + with : with * d->n + row);
+          if (pins && (q & 1) == i)
+            d->S[group->at[at - 1]] += group->J[q][i] * group->J[r][i] * plan->saddle->inverse_weight[j + i];
+        }
+      }
     }
-  }
 }
 
 /* The dense matrix of a scene with few equations. */
 static int condense_dense (const saddle_plan *plan) {
-  int first[PW_DENSE];
-  pw_block_ldl *l = plan->saddle->block = calloc (1, sizeof *l);
-  pw_dense *d = calloc (1, sizeof *d + (size_t)plan->groups * sizeof *d->group);
-  if (l == NULL || d == NULL) return free (d), PW_RESOURCE;
-  l->dense = d;
-  l->inverse_weight = plan->saddle->inverse_weight;
+  int first[PW_DENSE], known = 0;
+  pw_dense *d = plan->saddle->dense = calloc (1, sizeof *d + (size_t)plan->groups * sizeof *d->group);
+  if (d == NULL) return PW_RESOURCE;
+  for (int g = 0; g < plan->groups; g++) known += condense_known_rows (plan, g);
+  d->known = calloc ((size_t)known + 1, sizeof *d->known);
+  d->zero = calloc (2 * (size_t)plan->saddle->s->coords, sizeof *d->zero);
+  if (d->known == NULL || d->zero == NULL) return PW_RESOURCE;
+  d->scratch = d->zero + plan->saddle->s->coords;
+  d->inverse_weight = plan->saddle->inverse_weight;
   for (int n = 0; n < plan->nodes; n++) {
     first[n] = d->n;
     for (int i = 0; i < plan->node[n].size; i++) d->unknown[d->n++] = plan->node[n].unknown + i;
   }
-  d->padded = d->n > 2 && d->n % 2;
-  if (d->padded) d->unknown[d->n++] = d->unknown[0];
-  for (int g = 0; g < plan->groups; g++)
-    if (plan->start[g + 1] > plan->start[g]) condense_dense_group (plan, d, g, first);
-  d->coupled = d->groups;
-  for (int g = 0; g < plan->groups; g++)
-    if (plan->start[g + 1] == plan->start[g]) condense_dense_group (plan, d, g, first);
+  if (d->n > 2 && d->n % 2) {
+    d->unknown[d->n++] = d->unknown[0];
+    d->S[d->n * d->n - 1] = 1;
+  }
+  for (int g = 0; g < plan->groups; g++) condense_dense_group (plan, d, g, first);
   return PW_OK;
 }
 
@@ -1050,17 +1089,107 @@ static int condense_block (saddle_plan *plan) {
   return status == PW_OK ? condense_fill (plan, l) : status;
 }
 
+/* ---- Factorisation and solution ---- */
+
+void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
+  saddle->postponed = pivot;
+}
+
+/* The row of the smallest pivot, or -1. */
+static int saddle_pivot_row (const pw_saddle *saddle) {
+  const pw_block_ldl *l = saddle->block;
+  const pw_dense *d = saddle->dense;
+  if (l == NULL && d == NULL) return saddle->dependent_row;
+  const int row = (d ? d->least_pivot : l->least_pivot) > saddle->pivot ? -1
+                  : d                                                   ? pw_dense_least_unknown (d)
+                                                                        : l->least_unknown;
+  return row >= 0 && row < saddle->s->rows && saddle->component_of_row[row] < 0 ? row : -1;
+}
+
+/* Factorises, if `factors`, and solves, unless lambda is NULL.  massless: 1 if there are components; dense: 1 if S is
+ * dense. */
+PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int dense, int factors, const double *f, const double *gamma,
+                          double *a, double *lambda) {
+  pw_block_ldl *l = saddle->block;
+  double *y = lambda, pivot = INFINITY, *least = dense ? &saddle->dense->least_pivot : &l->least_pivot;
+  if (!dense && lambda && saddle->extra) {
+    y = saddle->y;
+    for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
+  }
+  if (y != gamma) memcpy (y, gamma, (size_t)saddle->rows * sizeof *y);
+  if (factors) saddle->postponed = 0;
+  if (massless) {
+    const size_t bytes = (size_t)saddle->s->coords * sizeof *f;
+    if (y && !f)
+      f = memset (saddle->force, 0, bytes);
+    else if (y && !dense)
+      f = memcpy (saddle->force, f, bytes);
+    pivot = massless_forward_all (saddle, factors, dense, f, y);
+    if (factors && !((saddle->pivot = pivot) > SADDLE_ROUND_OFF)) return *least = INFINITY, PW_RETRY;
+  }
+  if (dense)
+    pw_dense_run (saddle->dense, factors, f, y, a);
+  else if (factors)
+    pw_block_factor (l);
+  if (factors) {
+    saddle->pivot = *least >= pivot ? pivot : *least;
+    if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
+  }
+  if (y == NULL) return PW_OK;
+  if (!dense) pw_block_solve (l, f, y, a);
+  if (!dense && y != lambda) memcpy (lambda, y, (size_t)saddle->rows * sizeof *y);
+  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
+  if (massless) massless_backward (saddle, dense, a, lambda);
+  return PW_OK;
+}
+
+/* One function for each kind of scene: together, the code of one would add to the cost of the others. */
+#define SADDLE_RUN(name, massless, dense)                                                                        \
+  static int saddle_run_##name (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a, \
+                                double *lambda) {                                                                \
+    return saddle_run (saddle, massless, dense, factors, f, gamma, a, lambda);                                   \
+  }
+
+SADDLE_RUN (dense, 0, 1)
+SADDLE_RUN (sparse, 0, 0)
+SADDLE_RUN (massless_dense, 1, 1)
+SADDLE_RUN (massless_sparse, 1, 0)
+
+/* With equations that always depend on others, nothing is factorised. */
+static int saddle_run_dependent (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+                                 double *lambda) {
+  (void)factors, (void)f, (void)gamma, (void)a, (void)lambda;
+  saddle->postponed = saddle->pivot = 0;
+  return PW_RETRY;
+}
+
+int pw_saddle_factor (pw_saddle *saddle) {
+  return pw_saddle_factor_solve (saddle, NULL, NULL, NULL, NULL);
+}
+
+void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  (void)saddle->run (saddle, 0, f, gamma, a, lambda);
+}
+
+double pw_saddle_sine (pw_saddle *saddle, int *row) {
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  if (row) *row = saddle_pivot_row (saddle);
+  return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
+}
+
+/* ---- Opening ---- */
+
 void pw_saddle_close (pw_saddle *saddle) {
   if (saddle == NULL) return;
   free (saddle->component);
   free (saddle->component_memory);
   pw_block_close (saddle->block);
+  pw_dense_close (saddle->dense);
   free (saddle->y);
   free (saddle->memory);
   free (saddle);
 }
-
-/* ---- Opening ---- */
 
 static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
   pw_saddle *saddle = plan->saddle;
@@ -1079,12 +1208,21 @@ static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
   condense_components (plan);
   status = condense_sort (plan);
   if (status == PW_OK) status = condense_find_dependent (plan, &saddle->dependent_row);
+  saddle->run = saddle_run_dependent;
   if (status != PW_OK || saddle->dependent_row >= 0) return status;
   int equations = 0;
   for (int i = 0; i < plan->nodes; i++) equations += plan->node[i].size;
-  if (equations <= PW_DENSE) return condense_dense (plan);
-  status = condense_uncondensed (plan);
-  return status == PW_OK ? condense_block (plan) : status;
+  if (equations <= PW_DENSE) {
+    status = condense_dense (plan);
+  } else {
+    status = condense_uncondensed (plan);
+    if (status == PW_OK) status = condense_block (plan);
+  }
+  if (status != PW_OK) return status;
+  if (saddle->dense) massless_list_known (saddle);
+  saddle->run = saddle->components ? (saddle->dense ? saddle_run_massless_dense : saddle_run_massless_sparse)
+                                   : (saddle->dense ? saddle_run_dense : saddle_run_sparse);
+  return PW_OK;
 }
 
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
@@ -1093,7 +1231,7 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
   pw_saddle *saddle = plan.saddle = calloc (1, sizeof *saddle);
   int status = PW_RESOURCE;
   if (saddle) {
-    *saddle = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .pivot_row = -1, .dependent_row = -1 };
+    *saddle = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .dependent_row = -1 };
     status = saddle_plan_all (&plan, error);
   }
   free (plan.node);
@@ -1104,90 +1242,4 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
   pw_saddle_close (saddle);
   pw_fail (error, status, "model %s: out of memory", w->s->model);
   return NULL;
-}
-
-/* ---- Factorisation and solution ---- */
-
-void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
-  saddle->postponed = pivot;
-}
-
-/* Takes the least pivot of the block into account. */
-static inline int saddle_judge (pw_saddle *saddle) {
-  if (!(saddle->block->least_pivot >= saddle->pivot)) {
-    const int row = saddle->block->least_unknown;
-    saddle->pivot = saddle->block->least_pivot;
-    saddle->pivot_row = row >= 0 && row < saddle->s->rows && saddle->component_of_row[row] < 0 ? row : -1;
-  }
-  return saddle->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
-}
-
-/* Factorises, if `factors`, and solves, unless lambda is NULL.  massless: 1 if there are components. */
-PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int factors, const double *f, const double *gamma, double *a,
-                          double *lambda) {
-  pw_block_ldl *l = saddle->block;
-  double *y = lambda;
-  if (lambda && saddle->extra) { /* none if l is dense */
-    y = saddle->y;
-    for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
-  }
-  if (y != gamma) memcpy (y, gamma, (size_t)saddle->rows * sizeof *y);
-  if (factors) {
-    saddle->postponed = 0, saddle->pivot = l ? INFINITY : 0, saddle->pivot_row = saddle->dependent_row;
-    if (l == NULL) return PW_RETRY;
-  }
-  if (massless) {
-    const size_t bytes = (size_t)saddle->s->coords * sizeof *f;
-    if (y) f = f ? memcpy (saddle->force, f, bytes) : memset (saddle->force, 0, bytes);
-    double pivot = massless_forward_all (saddle, factors, y);
-    if (factors) saddle->pivot = pivot;
-    if (factors && !(pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
-  }
-  if (l->dense)
-    pw_dense_run (l, factors, f, y, a);
-  else if (factors)
-    pw_block_factor (l);
-  if (factors && saddle_judge (saddle) != PW_OK) return PW_RETRY;
-  if (y == NULL) return PW_OK;
-  if (!l->dense) pw_block_solve (l, f, y, a);
-  if (y != lambda) memcpy (lambda, y, (size_t)saddle->rows * sizeof *y);
-  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
-  if (massless) massless_backward (saddle, a, lambda);
-  return PW_OK;
-}
-
-PW_SELDOM int saddle_run_massless (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
-                                   double *lambda) {
-  return saddle_run (saddle, 1, factors, f, gamma, a, lambda);
-}
-
-/* Few scenes have massless coordinates: in one function, their code would add to the cost of the others. */
-PW_SELDOM int saddle_run_massive (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
-                                  double *lambda) {
-  return saddle_run (saddle, 0, factors, f, gamma, a, lambda);
-}
-
-int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  return (saddle->components ? saddle_run_massless : saddle_run_massive) (saddle, 1, f, gamma, a, lambda);
-}
-
-int pw_saddle_factor (pw_saddle *saddle) {
-  return pw_saddle_factor_solve (saddle, NULL, NULL, NULL, NULL);
-}
-
-void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  (void)(saddle->components ? saddle_run_massless : saddle_run_massive) (saddle, 0, f, gamma, a, lambda);
-}
-
-int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
-  if (sine * sine <= saddle->postponed) return 0;
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  return !(saddle->pivot >= sine * sine);
-}
-
-double pw_saddle_sine (pw_saddle *saddle, int *row) {
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  if (row) *row = saddle->pivot_row;
-  return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
 }

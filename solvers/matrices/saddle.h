@@ -11,7 +11,8 @@
 #include "system.h"
 
 /* Private, except for tests. */
-typedef struct {
+typedef struct pw_saddle {
+  int (*run) (struct pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a, double *lambda);
   const pw_system *s;
   const pw_workspace *w; /* contains J */
   int rows;              /* of J: all, or the holonomic ones */
@@ -23,13 +24,13 @@ typedef struct {
   double *force;              /* coords: f~ of saddle.c */
   int extra;                  /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
   double *y;                  /* s->rows + extra: right-hand side and solution; NULL without extra unknowns */
-  struct pw_block_ldl *block; /* NULL if there is a dependent_row: nothing is planned then */
+  struct pw_block_ldl *block; /* S, sparse, or */
+  struct pw_dense *dense;     /* dense; both are NULL if there is a dependent_row: nothing is planned then */
   int dependent_row;          /* one that depends on others in every configuration; -1: none */
   int *inactive;              /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
-  double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
+  double pivot; /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
                   * before it; of massless coordinates, see massless_forward_all */
-  int pivot_row; /* that row; -1: none, or one of a massless component */
   char *memory, *component_memory;
 } pw_saddle;
 
@@ -55,10 +56,18 @@ void pw_saddle_postpone (pw_saddle *saddle, double pivot);
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda);
 
 /* Factorises, and then solves unless it returns PW_RETRY; a and lambda are arbitrary in that case. */
-int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda);
+static inline int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a,
+                                          double *lambda) {
+  return saddle->run (saddle, 1, f, gamma, a, lambda);
+}
 
 /* 1 if pw_saddle_sine is below this sine. */
-int pw_saddle_sine_below (pw_saddle *saddle, double sine);
+static inline int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
+  const double square = sine * sine;
+  if (square <= saddle->postponed) return 0;
+  if (saddle->postponed > 0) (void)pw_saddle_factor (saddle);
+  return !(saddle->pivot >= square);
+}
 
 /* The square root of the smallest pivot, at most 1; 0 if that is not positive.  It is the sine of the angle between a
  * row and those before it, or a relative pivot of a coordinate without weight: small near a singular configuration.

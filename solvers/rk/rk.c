@@ -217,20 +217,38 @@ static int nullspace_finalise (rk_nullspace *b, pw_projector *p, pw_run *r, doub
 
 /* 1 if the next step ends with a coordinate projection. */
 static int rk_projects_next (const pw_run *r) {
-  return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
+  const pw_method_data *d = r->data;
+  return d->projects && (d->every == 1 || (r->statistics.steps + 1) % d->every == 0);
 }
 
-/* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau. */
-static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
-  const pw_method_data *d = r->data;
-  const double *q0 = r->q, *v0 = r->v;
-  for (int j = 0; j < row->count; j++, q0 = q, v0 = v) {
-    const double *dq = d->stage_v[row->stage[j]], *dv = d->stage_a[row->stage[j]], factor = h * row->weight[j];
-    for (int i = 0, n = r->s->coords; i < n; i += 2) { /* two numbers at a time, the last one perhaps of the ground */
-      *(pw_pair *)(q + i) = PW_PAIR (q0, i) + factor * PW_PAIR (dq, i);
-      *(pw_pair *)(v + i) = PW_PAIR (v0, i) + factor * PW_PAIR (dv, i);
-    }
+/* (q, v) = (q0, v0) + h sum_j weight_j (v_j, a_j) over `terms` weights of a row of the tableau from the j-th on. */
+PW_INLINE void rk_add (const pw_run *r, const pw_rk_row *row, int j, int terms, double h, double *q, double *v,
+                       const double *q0, const double *v0) {
+  const double *dq[2], *dv[2];
+  double factor[2];
+  PW_UNROLL for (int k = 0; k < terms; k++) {
+    const int stage = row->stage[j + k];
+    dq[k] = r->data->stage_v[stage], dv[k] = r->data->stage_a[stage], factor[k] = h * row->weight[j + k];
   }
+  for (int i = 0, n = r->s->coords; i < n; i += 2) { /* two numbers at a time, the last one perhaps of the ground */
+    pw_pair sum_q = PW_PAIR (q0, i), sum_v = PW_PAIR (v0, i);
+    PW_UNROLL for (int k = 0; k < terms; k++) {
+      sum_q += factor[k] * PW_PAIR (dq[k], i);
+      sum_v += factor[k] * PW_PAIR (dv[k], i);
+    }
+    *(pw_pair *)(q + i) = sum_q, *(pw_pair *)(v + i) = sum_v;
+  }
+}
+
+/* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau, two at a time. */
+static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
+  const double *q0 = r->q, *v0 = r->v;
+  int j = row->count & 1;
+  if (j) {
+    rk_add (r, row, 0, 1, h, q, v, q0, v0);
+    q0 = q, v0 = v;
+  }
+  for (; j < row->count; j += 2, q0 = q, v0 = v) rk_add (r, row, j, 2, h, q, v, q0, v0);
 }
 
 /* The ledger at the end of a step, from that at its beginning: end = beginning + h sum_j b_j rate_j. */
@@ -325,12 +343,11 @@ static void rk_point (double *state, size_t n, double **q, double **v, double **
 /* Makes the new state the state reached. */
 static void rk_accept (pw_run *r, double h, double t1, double added_energy) {
   pw_method_data *d = r->data;
-  const size_t n = (size_t)r->s->coords + 3, entries = (size_t)r->entries * sizeof (double);
+  const size_t n = (size_t)r->s->coords + 3;
   double *const reached = d->q, *const spare = d->last.q;
   d->nodes = d->samples = 0;
   d->last.t = r->t, d->last.projected = r->projected, d->last.q = r->q;
-  memcpy (d->last.ledger, r->ledger, entries);
-  memcpy (d->last.rate, r->rate, entries);
+  for (int i = 0; i < r->entries; i++) d->last.ledger[i] = r->ledger[i], d->last.rate[i] = r->rate[i];
   rk_point (reached, n, &r->q, &r->v, &r->a, &r->lambda);
   rk_point (spare, n, &d->q, &d->v, &d->a, &d->lambda);
   r->t = t1;
@@ -985,7 +1002,7 @@ static pw_scene_watch several_watchdog (const pw_run *r) {
   const pw_watchdog *watch = &r->watchdog;
   const double T = r->w->scale.time, L = r->s->scale.length, largest = watch->largest_sine;
   pw_scene_watch x = { .sine = INFINITY, .moved = watch->moved, .reference = r->reference_level };
-  x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
+  x.lost = pw_lost_residual (r);
   if (watch->saddle) /* else a tree of holonomic joints, never singular */
     x.sine = watch->checked_sine, x.reach = limit->lipschitz * largest, x.near_sine = limit->near * largest;
   x.growth = limit->step_growth, x.rank_lost = limit->rank_lost, x.regular = limit->regular * largest;

@@ -295,10 +295,9 @@ __attribute__ ((noinline)) static void dynamics_couple (pw_run *r, const double 
   for (int k = 0; k < m; k++) r->reaction[r->coupling[k].row] = -x[k];
 }
 
-/* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
- * constant forces if there are no others. */
-static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
-  pw_run_gamma (r, v, gamma);
+/* Returns the forces at the current configuration: those computed into f, or the system's array of constant forces if
+ * there are no others.  gamma: as of the equations. */
+static inline const double *dynamics_forces (pw_run *r, double *f, const double *gamma) {
   if (r->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
   if (r->forces == PW_FORCES_AT_LIMITS) {
@@ -325,7 +324,8 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */
   double *da = r->w->scratch, *dlambda = da + s->coords + 3, *Jda = dlambda + s->rows; /* corrections */
-  if (dynamics_right_side (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
+  pw_run_gamma (r, v, gamma);
+  if (dynamics_forces (r, f, gamma) != f) pw_evaluate_force (r->w, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dlambda[i] = lambda[i];
   double size = INFINITY;
@@ -342,7 +342,8 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
 }
 
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
-  const double *f = dynamics_right_side (r, v, r->scratch, lambda);
+  pw_run_gamma (r, v, lambda);
+  const double *f = dynamics_forces (r, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   if (pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
@@ -350,26 +351,34 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
 
 /* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration, where the status
  * is PW_RETRY if the sine is at most r->refused_sine. */
-static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
-  const double *f = dynamics_right_side (r, v, r->scratch, lambda);
+PW_INLINE int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
+  const double *f = dynamics_forces (r, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
   int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
-  *near = pw_watchdog_near (r);
+  *near = r->watchdog.singular_ahead && pw_watchdog_near (r);
   if (*near && r->watchdog.evaluated_sine <= r->refused_sine) return PW_RETRY;
   if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }
 
-int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda) {
+int pw_run_accelerate_by_gamma (pw_run *r, const double *v, double *a, double *lambda) {
   int near;
+  if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, lambda);
   return dynamics_solve (r, v, a, lambda, &near);
+}
+
+int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda) {
+  pw_evaluate_gamma (r->w, lambda);
+  return pw_run_accelerate_by_gamma (r, v, a, lambda);
 }
 
 int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
   if (specialised_evaluate (r, t, q, v, a, lambda)) return PW_OK;
-  int near, status = pw_evaluate_J_at (r->w, t, q, v);
+  int near, status = pw_update_kinematics (r->w, t, q, v);
   if (status != PW_OK) return status;
+  pw_evaluate_J_gamma (r->w, lambda);
+  if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, lambda);
   status = dynamics_solve (r, v, a, lambda, &near);
   if (near) r->near_singular = 1;
   return status;
@@ -382,15 +391,23 @@ void pw_sample_reached (pw_run *r) {
   (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);
 }
 
-void pw_record_residuals (pw_run *r) {
+/* Completes r->residuals: those below the largest so far, unless the constraints were lost then, need not be known. */
+PW_SELDOM void dynamics_evaluate_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
-  pw_statistics *largest = &r->statistics;
+  const double lost = pw_lost_residual (r), position = fmin (r->statistics.position, lost),
+               velocity = fmin (r->statistics.velocity, lost);
   if (pw_specialised_suits (r) && !r->active && isnan (now->position) && isnan (now->velocity)) {
     r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
     specialised_copy_residuals (r);
   }
-  if (isnan (now->position)) pw_evaluate_position_residual (r->w, r->enforced, now);
-  if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, r->enforced, now);
+  if (isnan (now->position)) pw_evaluate_position_residual (r->w, r->enforced, position, now);
+  if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, r->enforced, velocity, now);
+}
+
+void pw_record_residuals (pw_run *r) {
+  const pw_residuals *now = &r->residuals;
+  pw_statistics *largest = &r->statistics;
+  if (isnan (now->position) || isnan (now->velocity)) dynamics_evaluate_residuals (r);
   largest->position = pw_larger (largest->position, now->position);
   largest->velocity = pw_larger (largest->velocity, now->velocity);
   largest->g = pw_larger (largest->g, now->g);

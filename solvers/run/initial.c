@@ -274,9 +274,8 @@ static double initial_objective (initial_search *x, pw_residuals *now) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return INFINITY;
   pw_evaluate_g (r->w, x->residual);
   initial_release (x);
-  pw_evaluate_g_size (r->w, size);
   for (int i = 0; i < x->rows; i++) sum += x->residual[i] / x->unit[i] * (x->residual[i] / x->unit[i]);
-  pw_worst_position (x->s, x->residual, size, NULL, now);
+  pw_worst_position (r->w, x->residual, size, NULL, 0, now);
   return isfinite (sum) ? sum : INFINITY;
 }
 

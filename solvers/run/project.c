@@ -53,16 +53,21 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* PW_RETRY if a redundant equation is violated where the others hold: it contradicts them.  g, size: residuals and the
- * sizes of their terms. */
-static int project_check_redundant (pw_projector *p, const pw_run *r, const double *g, const double *size) {
+/* PW_RETRY if a redundant equation is violated where the others hold: it contradicts them.  size: scratch. */
+static int project_check_redundant (pw_projector *p, const pw_run *r, const double *g, double *size) {
   double largest = r->thresholds.redundant_residual;
   if (p->active == NULL || p->ignores_inactive) return PW_OK;
+  pw_evaluate_g_size (r->w, size);
   for (int i = 0; i < r->s->holonomic; i++) {
     double residual = p->active[i] || (r->enforced && !r->enforced[i]) ? 0 : fabs (g[i]) / size[i];
     if (residual > largest || isnan (residual)) largest = residual, p->contradictory_row = i;
   }
   return p->contradictory_row < 0 ? PW_OK : PW_RETRY;
+}
+
+/* Residuals below this one need not be computed: an iteration has converged, and there have been larger ones. */
+static double project_known (double largest) {
+  return largest < PW_RESIDUAL_CONVERGED ? largest : PW_RESIDUAL_CONVERGED;
 }
 
 double pw_largest_angle (const pw_system *s, const double *q) {
@@ -71,21 +76,21 @@ double pw_largest_angle (const pw_system *s, const double *q) {
   return largest;
 }
 
-int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
-  const double small = 1e-6;     /* below this residual, a correction hardly changes the sizes of the terms */
+/* As pw_project_positions; then J and, unless it is NULL, gamma are evaluated. */
+static int project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, double *gamma) {
   const int max_iterations = 30; /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
   double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows;
   double previous = INFINITY; /* the residual before the last correction */
   double accepted = PW_RESIDUAL_ACCEPTED, at_large_angles = 0;
+  const double known = project_known (r->statistics.position);
   p->contradictory_row = -1;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_update_kinematics (r->w, t, q, v);
     if (status != PW_OK) return status;
     pw_evaluate_g (r->w, g);
-    if (!(previous < small)) pw_evaluate_g_size (r->w, size);
-    pw_worst_position (s, g, size, p->active, &now);
+    pw_worst_position (r->w, g, size, p->active, known, &now);
     int stalled = now.position > previous / 4; /* at round-off, since convergence is quadratic */
     if (now.position <= PW_RESIDUAL_CONVERGED) break;
     if (stalled && now.position <= accepted) break;
@@ -102,8 +107,16 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
   int status = project_check_redundant (p, r, g, size);
-  if (status == PW_OK) pw_evaluate_J (r->w);
-  return status;
+  if (status != PW_OK) return status;
+  if (gamma)
+    pw_evaluate_J_gamma (r->w, gamma);
+  else
+    pw_evaluate_J (r->w);
+  return PW_OK;
+}
+
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
+  return project_positions (p, r, t, q, v, NULL);
 }
 
 /* v += dv with J (v + dv) = eta; p->velocity must be factorised. */
@@ -132,28 +145,25 @@ static int project_accepts_velocities (const pw_projector *p, pw_run *r) {
   r->residuals.velocity = NAN;
   if (p->owns_velocity || p->active || r->near_singular) return 0;
   pw_residuals now;
-  pw_evaluate_velocity_residual (r->w, NULL, &now);
+  pw_evaluate_velocity_residual (r->w, NULL, project_known (r->statistics.velocity), &now);
   if (!(now.velocity <= PW_RESIDUAL_CONVERGED)) return 0;
   r->residuals.velocity = now.velocity, r->residuals.jv = now.jv;
   return 1;
 }
 
 static int project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
-  if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
+  if (r->specialised && pw_specialised_project (p, r, t, q, v, a, lambda)) {
     p->iterations = r->scene->iterations, p->contradictory_row = -1;
     return PW_OK;
   }
-  int status = pw_project_positions (p, r, t, q, v);
+  int status = project_positions (p, r, t, q, v, lambda);
   if (status != PW_OK) return status;
-  if (!project_accepts_velocities (p, r)) {
-    status = pw_project_velocities (p, r, v);
-    if (status != PW_OK) return status;
-    if (!p->owns_velocity) {
-      pw_run_accelerate_updated (r, v, a, lambda);
-      return PW_OK;
-    }
-  }
-  return pw_run_accelerate_evaluated (r, v, a, lambda);
+  if (project_accepts_velocities (p, r)) return pw_run_accelerate_by_gamma (r, v, a, lambda);
+  status = pw_project_velocities (p, r, v);
+  if (status != PW_OK || p->owns_velocity)
+    return status == PW_OK ? pw_run_accelerate_evaluated (r, v, a, lambda) : status;
+  pw_run_accelerate_updated (r, v, a, lambda);
+  return PW_OK;
 }
 
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,

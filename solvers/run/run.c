@@ -179,8 +179,8 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   pw_forget_residuals (r);
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   r->interrupted |= r->t >= r->breakpoint;
-  status = pw_run_settle (r, error);
-  if (status == PW_OK) status = run_reselect (r, error);
+  if (r->interrupted) status = pw_run_settle (r, error);
+  if (status == PW_OK && r->redundant > 0) status = run_reselect (r, error);
   const double stop = t_end < r->breakpoint ? t_end : r->breakpoint;
   if (status == PW_OK && run_is_at (r, stop)) {
     if (r->t != r->moved_to) r->moved_from = r->t;
@@ -287,11 +287,9 @@ int pw_run_check_limits (pw_run *r, pw_error *error) {
                   now->steps + now->rejected, now->rejected);
 }
 
-int pw_run_check_resolution (pw_run *r, pw_error *error) {
+PW_SELDOM int limits_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  const double span = r->t - r->settings.t;
-  if (span < 2 * r->checked_span && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
-  r->checked_span = span;
+  r->checked_span = r->t - r->settings.t;
   for (int j = 0; j < s->mechanical; j++) {
     double round_off = fabs (r->q[j]) * DBL_EPSILON;
     if (!(round_off > LIMITS_RESOLVED * pw_unit (s, j))) continue;
@@ -304,6 +302,11 @@ int pw_run_check_resolution (pw_run *r, pw_error *error) {
                     r->t, PW_NAME (pw_system_state_name, s, j), r->q[j], pw_system_state_unit (s, j), round_off);
   }
   return PW_OK;
+}
+
+int pw_run_check_resolution (pw_run *r, pw_error *error) {
+  const int is_due = r->t - r->settings.t >= 2 * r->checked_span || r->statistics.steps % PW_CHECK_INTERVAL == 0;
+  return is_due ? limits_resolution (r, error) : PW_OK;
 }
 
 /* The energy of a run and its ledger of work, losses and integrals: scales, tolerance, energy defect.  Every run keeps
@@ -408,16 +411,19 @@ void pw_ledger_begin (pw_run *r) {
   ledger_record_integrands (r, r->rate + r->s->entries);
 }
 
-/* Samples the first PW_CHECK_INTERVAL steps and every PW_CHECK_INTERVAL-th: sufficient for a scale, at negligible
- * cost. */
-void pw_ledger_record (pw_run *r) {
-  double power = 0;
-  ledger_record_integrands (r, r->rate + r->s->entries);
-  if (r->statistics.steps > PW_CHECK_INTERVAL && r->statistics.steps % PW_CHECK_INTERVAL != 0) return;
-  double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->w) - r->potential0));
+PW_SELDOM void ledger_record_energies (pw_run *r) {
+  double power = 0, exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->w) - r->potential0));
   for (int i = 0; i < r->s->entries; i++) power += fabs (r->rate[i]);
   if (exchanged > r->exchanged && isfinite (exchanged)) r->exchanged = exchanged;
   if (power > r->power && isfinite (power)) r->power = power;
+}
+
+/* Samples the first PW_CHECK_INTERVAL steps and every PW_CHECK_INTERVAL-th: sufficient for a scale, at negligible
+ * cost. */
+void pw_ledger_record (pw_run *r) {
+  if (r->settings.integrals) ledger_record_integrands (r, r->rate + r->s->entries);
+  if (r->statistics.steps <= PW_CHECK_INTERVAL || r->statistics.steps % PW_CHECK_INTERVAL == 0)
+    ledger_record_energies (r);
 }
 
 /* Multipliers of all equations from those of the active ones. */
@@ -429,9 +435,9 @@ static const double *ledger_multipliers (pw_run *r, const double *lambda) {
   return all;
 }
 
-void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
-  const int integrals = r->settings.integrals, unique = r->redundant_drive || (integrals && r->redundant);
-  if (unique) lambda = ledger_multipliers (r, lambda);
+void pw_ledger_all_rates (pw_run *r, const double *lambda, double *rate) {
+  const int integrals = r->settings.integrals;
+  if (r->redundant_drive || (integrals && r->redundant)) lambda = ledger_multipliers (r, lambda);
   pw_evaluate_ledger (r->w, lambda, rate);
   if (integrals) ledger_integrands (r, lambda, rate, rate + r->s->entries);
 }

@@ -669,9 +669,9 @@ static int watchdog_contradicts (pw_run *r) {
 
 /* ---- Jumps ---- */
 
-/* The residual of positions: scaled, or in units of L if that is larger. */
+/* The residual of positions in units of L. */
 static double watchdog_residual (const pw_run *r) {
-  return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
+  return r->residuals.g / r->s->scale.length;
 }
 
 /* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
@@ -679,9 +679,10 @@ static double watchdog_residual (const pw_run *r) {
  * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
+  const double lost = r->thresholds.rank_lost;
+  if (residual <= ratio * lost * lost) return 0;
   double bound = fmin (sqrt (residual / ratio), r->thresholds.regular * r->watchdog.largest_sine);
-  return bound > r->thresholds.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
-         row < r->s->holonomic;
+  return bound > lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound && row < r->s->holonomic;
 }
 
 /* Fails where residuals may decide the branch and accelerations have grown, or residuals are large: the turn is then a
@@ -723,7 +724,7 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
 
 int pw_run_watchdog (pw_run *r, pw_error *error) {
   pw_record_residuals (r);
-  double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->thresholds.lost_unstabilised : r->thresholds.lost;
+  double lost = pw_lost_residual (r);
   int contradicts = r->redundant && watchdog_contradicts (r);
   if (contradicts || watchdog_exceeds (r->residuals.position, r->residuals.velocity, lost))
     return watchdog_fail_lost (r, contradicts, error);

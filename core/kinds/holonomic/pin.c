@@ -33,4 +33,5 @@ const pw_kind pw_kind_pin = {
   .reaction = pin_reaction,
   POSITION (points),
   CONSTRAINT (points),
+  .J_gamma = points_J_gamma,
 };

@@ -49,6 +49,7 @@ const pw_kind pw_kind_rod = {
   REACTION ("F", "N", "force on the first body, away from the second; negative: tension"),
   POSITION (rod),
   CONSTRAINT (rod),
+  .J_gamma = rod_J_gamma,
 };
 
 const pw_kind pw_kind_rope = {
@@ -62,5 +63,6 @@ const pw_kind pw_kind_rope = {
   REACTION ("F", "N", "force on the first body, away from the second: minus the tension"),
   POSITION (rod),
   CONSTRAINT (rod),
+  .J_gamma = rod_J_gamma,
   .limits = rope_limits,
 };

@@ -28,4 +28,5 @@ const pw_kind pw_kind_slot = {
   REACTION ("N", "N", "force on the first body, to the left of the line's heading"),
   POSITION (line),
   CONSTRAINT (line),
+  .J_gamma = line_J_gamma,
 };

@@ -50,6 +50,8 @@ PER_ELEMENT (weld_gamma, weld, 3) {
   out[2] = 0;
 }
 
+J_GAMMA (weld, 18, 3)
+
 /* Defines weld_jw_q, ...: the first two rows are those of points.h, the third is 0. */
 #define WELD_DERIVATIVE(member)              \
   PER_ELEMENT (weld_##member, weld, 18) {    \
@@ -84,4 +86,5 @@ const pw_kind pw_kind_weld = {
   .reaction = weld_reaction,
   POSITION (weld),
   CONSTRAINT (weld),
+  .J_gamma = weld_J_gamma,
 };

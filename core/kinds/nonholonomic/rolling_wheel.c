@@ -66,6 +66,8 @@ PER_ELEMENT (rolling_gamma, rolling, 2) {
   contact_gamma_one (now.along, out + 1);
 }
 
+J_GAMMA (rolling, 8, 2)
+
 /* Defines rolling_jw_q, ...: the derivatives with respect to the spin angle or spin velocity are 0. */
 #define ROLLING_DERIVATIVE(member)               \
   PER_ELEMENT (rolling_##member, rolling, 8) {   \
@@ -172,6 +174,7 @@ const pw_kind pw_kind_rolling_wheel = {
   .reaction = rolling_reaction,
   .coordinate = rolling_coordinate,
   CONSTRAINT (rolling),
+  .J_gamma = rolling_J_gamma,
   .force = rolling_force,
   .force_u = rolling_force_u,
   .power = rolling_power,

@@ -54,6 +54,8 @@ PER_ELEMENT (steered_gamma, steered, 1) {
   *out = -now.heading_rate * contact_speed_phi (&now.contact) - now.steering_rate * now.h * now.contact.body->omega;
 }
 
+J_GAMMA (steered, 3, 1)
+
 PER_ELEMENT (steered_jw_q, steered, 3) {
   contact_jw_q_one (now.contact, out);
 }
@@ -104,6 +106,7 @@ const pw_kind pw_kind_steered_wheel = {
   .level = PW_NONHOLONOMIC,
   REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (steered),
+  .J_gamma = steered_J_gamma,
   .limits = steered_limits,
   .loss = steered_loss,
   .J_u = steered_J_u,

@@ -42,6 +42,7 @@ const pw_kind pw_kind_wheel = {
   .level = PW_NONHOLONOMIC,
   REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (contact),
+  .J_gamma = contact_J_gamma,
   .limits = wheel_limits,
   .loss = wheel_loss,
   .contact = contact_place,

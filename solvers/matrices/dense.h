@@ -1,0 +1,59 @@
+/* The condensed matrix S = J W^-1 J^T (saddle.h) of a scene of few equations as a dense one.
+ *
+ * The rows of a body are listed once.  In the x and y columns of a pin J is the unit matrix or its negative (points.h),
+ * so that the products of these columns are constant.  Rows that are not in S, those of massless coordinates
+ * (saddle.c), may act on a body, too: their multipliers are known before, their products J a are needed after. */
+#ifndef PW_DENSE_H
+#define PW_DENSE_H
+
+enum { PW_DENSE = 10 }; /* most equations */
+
+/* A row that is not in S, in the columns of a group: J a is subtracted from *right. */
+typedef struct {
+  const double *J, *multiplier;
+  double *right;
+} pw_dense_known;
+
+/* A body or an internal coordinate with the rows that have entries in its columns. */
+typedef struct pw_dense_group {
+  /* The group's part of S, y and, if it has known rows, a; its part of a.  See dense.c. */
+  void (*add) (const struct pw_dense_group *p, const double *w, const double *f, double *S, double *y, double *a);
+  void (*accelerate) (const struct pw_dense_group *p, const double *w, const double *f, const double *y, double *a);
+  int j, width;                                    /* first coordinate; columns: 3, or 1 */
+  int rows, pins;                                  /* rows; pins, whose pairs of rows come first */
+  const double *J[PW_DENSE];                       /* of each row, its entries */
+  unsigned char row[PW_DENSE];                     /* of each row, its number in S */
+  unsigned char at[PW_DENSE * (PW_DENSE + 1) / 2]; /* index in S of each row with each row up to itself */
+  int known_rows;
+  const pw_dense_known *known;
+} pw_dense_group;
+
+/* A matrix of an odd number of rows, 3 or more, has one more, that of the unit matrix, with the unknown of the first
+ * row, which is stored after it. */
+typedef struct pw_dense {
+  void (*run) (struct pw_dense *d, int factors, const double *f, double *y, double *a);
+  int n, groups;                 /* rows; groups */
+  int unknown[PW_DENSE];         /* of each row: index in lambda */
+  double S[PW_DENSE * PW_DENSE]; /* n x n: what is constant; then the diagonal entry of the row that is one more */
+  double L[PW_DENSE * PW_DENSE]; /* n x n: L below the diagonal, D^-1 on it */
+  double pivot[PW_DENSE];        /* of each row: D over the diagonal entry of S */
+  double least_pivot;            /* the smallest */
+  const double *inverse_weight;  /* diagonal of W^-1, owned by the saddle */
+  double *zero, *scratch;        /* coords each, one allocation */
+  pw_dense_known *known;         /* of all groups */
+  pw_dense_group group[];
+} pw_dense;
+
+void pw_dense_open (pw_dense *d);  /* selects the functions for the rows and groups described */
+void pw_dense_close (pw_dense *d); /* d may be NULL */
+
+/* Factorises S with the J last evaluated, if `factors`, whatever the pivots are.  Then, unless y is NULL, y, which
+ * holds gamma, becomes lambda, and a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
+static inline void pw_dense_run (pw_dense *d, int factors, const double *f, double *y, double *a) {
+  d->run (d, factors, f, y, a);
+}
+
+/* Index in lambda of the unknown of the smallest pivot. */
+int pw_dense_least_unknown (const pw_dense *d);
+
+#endif
