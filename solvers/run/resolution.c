@@ -208,7 +208,6 @@ int pw_resolution_open (pw_run *r, pw_error *error) {
     const double longest = resolution_harmonic (r, source);
     if (longest < found.harmonic) found.harmonic = longest, found.missed = source;
   }
-  r->resolved_until = INFINITY;
   if (found.count == 0 && !(found.harmonic < (r->fixed_steps ? r->settings.step : INFINITY))) return PW_OK;
   d = r->resolution = pw_arena_alloc (&r->arena, sizeof *d);
   resolution_signal *signal = pw_arena_alloc (&r->arena, (size_t)found.count * sizeof *signal);

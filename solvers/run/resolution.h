@@ -8,7 +8,7 @@
 int pw_resolution_open (pw_run *r, pw_error *error);
 
 /* The time at which the next adaptive step must end at the latest; INFINITY with fixed steps, which are counted if they
- * do not resolve a signal.  Sets r->resolved_until. */
+ * do not resolve a signal.  Sets r->resolved_until, which is INFINITY before. */
 double pw_resolution_end (pw_run *r);
 
 #endif
