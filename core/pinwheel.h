@@ -346,6 +346,10 @@ void pw_path_nearest (const pw_path *p, double x, double y, double near, pw_path
 /* The first arc length after s at which the direction or the curvature jumps; INFINITY if there is none. */
 double pw_path_break (const pw_path *p, double s);
 int pw_path_is_smooth (const pw_path *p); /* 1: a spline; 0: a polyline */
+/* An arc length at which a disc on the left of the path that touches it there enters it elsewhere, or is larger than
+ * the circle of curvature; NaN if there is none.  It is sought at four places of each piece between points that is not
+ * cut further (path.c), and beyond the ends of an open path up to its length. */
+double pw_path_tight (const pw_path *p, double radius);
 double pw_path_length (const pw_path *p); /* [m]; of a closed path: of one lap */
 
 /* ---- The element types: position constraints, velocity constraints, forces, markers ---- */
@@ -439,14 +443,15 @@ typedef struct {
   double restitution;         /* velocity after the rope has become taut over that before it, 0 to 1 */
 } pw_rope;
 
-/* Contact: a point or disc of body 1 stays on the left side of a line of body 2, or outside of a disc of body 2.  One
- * holonomic constraint equation, and with friction a nonholonomic one. */
+/* Contact: a point or disc of body 1 stays on the left side of a line or a path of body 2, or outside of a disc of body
+ * 2.  One holonomic constraint equation, and with friction a nonholonomic one. */
 typedef struct {
   const char *name, *body[2]; /* what touches, and what it touches, or "ground" for one of them */
-  double at[2][2];            /* the point or centre; a point of the line, or the centre, in each body's frame [m] */
-  double heading;             /* direction of the line in body 2's frame [rad] */
+  double at[2][2];            /* the point or centre; a point of the line, the centre or the origin of the path [m] */
+  double heading;             /* direction of the line, or of the path's x axis, in body 2's frame [rad] */
   double radius;              /* of the disc of body 1 [m]; 0: a point */
   double other_radius;        /* of the disc of body 2 [m]; 0: a line */
+  pw_path *path;              /* a spline in place of the line, where the disc fits everywhere; NULL: none */
   double restitution;         /* normal velocity after an impact over that before it, 0 to 1 */
   double mu;                  /* largest friction over normal force; 0: no friction */
   double mu_sliding;          /* the same while it slides, at most mu; 0: mu */
@@ -653,14 +658,15 @@ typedef struct {
 
 /* ---- What an element type provides ---- */
 
-/* PW_POINT: fixed in a body; point i of a definition is in the frame of its body i.  PW_VECTOR: any other pair. */
-typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE, PW_TEXT } pw_field_type;
+/* PW_POINT: fixed in a body; point i of a definition is in the frame of its body i.  PW_VECTOR: any other pair.
+ * PW_TRACK: a path or NULL; models and systems become owners of it. */
+typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE, PW_TEXT, PW_TRACK } pw_field_type;
 
 /* One field of a definition structure: used by validation, text models, `show`, `list kinds` and the manual. */
 typedef struct pw_field {
   const char *name;           /* as written in a model file */
   size_t offset;              /* in the definition structure */
-  pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int, const char * */
+  pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int, const char *, pw_path * */
   int count;                  /* array length; 0 stands for 1 */
   const char *unit;           /* NULL: no unit */
   int required;               /* 1: required in a text model */
@@ -900,6 +906,7 @@ typedef struct {
   const char *name;
   const double *x, *y; /* count */
   int count, interpolation, closed;
+  const pw_path *path;
 } pw_path_text;
 
 /* Reference solution of a text model, expressions of time for some states; names and paths used in expressions. */

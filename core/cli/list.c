@@ -16,7 +16,8 @@ static const struct {
                    [PW_BODY] = { "body", "", "BODY" },
                    [PW_SIGNAL] = { "signal", "0", "SIGNAL" },
                    [PW_CHOICE] = { "choice", "", "" },
-                   [PW_TEXT] = { "text", "", "TEXT" } };
+                   [PW_TEXT] = { "text", "", "TEXT" },
+                   [PW_TRACK] = { "path", "none", "PATH" } };
 
 /* A row such as "radius  number [m]  required  radius of the wheel", the last column wrapped. */
 static void list_row (pw_table *t, const char *name, const char *type, const char *value, const char *about) {

@@ -41,6 +41,7 @@ static void yaml_pairs (const double *x, const double *y, int count) {
 
 /* 1 if an optional field has its default, zero in all bytes, and is not specified nevertheless. */
 static int yaml_is_default (const pw_field *f, const void *structure, const void *at) {
+  if (f->type == PW_TRACK) return 1; /* yaml_path */
   if (f->required || f->type == PW_BODY) return 0;
   if (f->given && *(const int *)(const void *)((const char *)structure + f->given)) return 0;
   size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
@@ -111,6 +112,15 @@ static const char *yaml_fields (const pw_field *f, const void *structure, const 
   return separator;
 }
 
+/* The name of the path of an element of a text model, "" if it has no name; NULL: the element has no path. */
+static const char *yaml_path (const pw_model *m, const pw_element *e) {
+  const pw_reference_text *text = pw_model_reference_text (m);
+  pw_path *const *path = pw_field_at (e->kind, e->definition, PW_TRACK, 0);
+  for (int i = 0; path && *path && i < text->paths; i++)
+    if (text->path[i].path == *path) return text->path[i].name;
+  return path && *path ? "" : NULL;
+}
+
 /* Numbers that are not the default, or that the model specifies: bit i of `specified`. */
 static void yaml_triple (const char *key, const char *const name[3], const double value[3], unsigned specified) {
   int written = 0;
@@ -154,6 +164,10 @@ static int yaml_check (const pw_model *m, pw_error *error) {
       return pw_fail (error, PW_INPUT,
                       "model %s cannot be written as text: %s %s has an element type of the model's own", model, kind,
                       name);
+    const char *path = yaml_path (m, e);
+    if (path && *path == 0)
+      return pw_fail (error, PW_INPUT, "model %s cannot be written as text: the path of %s %s is the model's own",
+                      model, kind, name);
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
       for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
@@ -220,6 +234,7 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
       if (written++ == 0) puts (of_states ? "states:" : "elements:");
       printf ("  - {%s: ", of_states ? "name" : x->kind->name), yaml_name (pw_element_name (x));
       yaml_fields (x->kind->fields, x->definition, ", ", YAML_DIGITS);
+      if (yaml_path (m, x)) printf (", path: %s", yaml_path (m, x));
       puts ("}");
     }
   yaml_outputs (m);
@@ -296,9 +311,12 @@ static void show_model (const pw_cli_model *m) {
   for (const pw_element *end = e + elements; e < end; e++) {
     printf ("  %s %s: ", e->kind->name, pw_element_name (e));
     for (const pw_field *f = e->kind->fields; f->name; f++) {
+      const char *path = f->type == PW_TRACK ? yaml_path (m->model, e) : "";
+      if (path == NULL) continue;
       if (f->type == PW_TEXT && yaml_is_default (f, e->definition, (const char *)e->definition + f->offset)) continue;
       printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
       yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
+      fputs (path, stdout);
       if (f->unit) printf (" %s", f->unit);
     }
     putchar ('\n');

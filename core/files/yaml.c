@@ -155,6 +155,18 @@ static int build_point (pw_reader *r, const pw_node *node, int i, double to[2]) 
   return PW_OK;
 }
 
+static int build_path (pw_reader *r, const pw_node *node, pw_path **to) {
+  const pw_scope *s = r->scope;
+  const char *name;
+  if (pw_yaml_text (r, node, r->label, &name) != PW_OK) return r->error->status;
+  const int found = pw_names_find (&s->index, name);
+  if (found >= 0 && s->path[found]) return *to = s->path[found], PW_OK;
+  pw_nearest near = { .sought = name };
+  for (int i = 0; i < s->names; i++)
+    if (s->path[i]) pw_nearest_try (&near, s->name[i]);
+  return read_fail (r, node->at, "%s: there is no path \"%.60s\"%s", r->label, name, pw_nearest_text (&near));
+}
+
 static int build_value (pw_reader *r, const pw_node *node, int i, void *to) {
   switch (r->field->type) {
   case PW_NUMBER:
@@ -171,6 +183,8 @@ static int build_value (pw_reader *r, const pw_node *node, int i, void *to) {
     return pw_yaml_choice (r, node, r->label, r->field->choices, to);
   case PW_TEXT:
     return pw_yaml_text (r, node, r->label, to);
+  case PW_TRACK:
+    return build_path (r, node, to);
   }
   return read_fail (r, node->at, "%s cannot be given in a text model", r->label);
 }
@@ -182,7 +196,8 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
                                         [PW_BODY] = "bodies",
                                         [PW_SIGNAL] = "signals",
                                         [PW_CHOICE] = "choices",
-                                        [PW_TEXT] = "texts" };
+                                        [PW_TEXT] = "texts",
+                                        [PW_TRACK] = "paths" };
   const pw_field *f = r->field;
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);

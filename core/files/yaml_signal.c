@@ -641,6 +641,7 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
   pw_path *path = pw_path_open (p.x, p.y, p.count, text->interpolation, text->closed, &cause);
   if (cause.status == PW_INPUT) return read_fail (r, (v[1] ? v[1] : v[2])->at, "%s: %s", label, cause.text);
   if (path == NULL || pw_model_keep (r->model, path, path_free) != PW_OK) return read_no_memory (r);
+  text->path = path;
   r->reference->paths++;
   return pw_yaml_name_path (r, r->scope, r->prefix, text->name, path);
 }

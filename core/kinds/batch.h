@@ -168,6 +168,11 @@ static inline void to_world (const pw_configuration *body, const double s[2], do
   out[1] = body->sin * s[0] + body->cos * s[1];
 }
 
+/* The velocities of two bodies, in the order of local coordinates. */
+static inline void velocities_of (const pw_configuration *body1, const pw_configuration *body2, double v[6]) {
+  v[0] = body1->vx, v[1] = body1->vy, v[2] = body1->omega, v[3] = body2->vx, v[4] = body2->vy, v[5] = body2->omega;
+}
+
 /* F limited smoothly to L tanh (F / L); F itself if L = 0.  *slope: derivative with respect to F. */
 static inline double limited_force (double F, double L, double *slope) {
   double y = WHERE (L > 0, tanh (F / L));

@@ -38,16 +38,22 @@ static inline line line_make (const double at[2][2], double heading) {
   return out;
 }
 
+/* Sets the normal, in world axes, and what depends on it. */
+static inline void line_set_normal (line_state *now, double x, double y) {
+  now->n[0] = x, now->n[1] = y, now->t[0] = y, now->t[1] = -x;
+  now->na = now->n[0] * now->a[0] + now->n[1] * now->a[1], now->nD = now->n[0] * now->D[0] + now->n[1] * now->D[1];
+  now->ta = now->t[0] * now->a[0] + now->t[1] * now->a[1], now->tD = now->t[0] * now->D[0] + now->t[1] * now->D[1];
+}
+
 /* The line of an element with two bodies that contains a line among other data. */
 static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
   const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   line_state now = { constants, body1, body2, .w = batch_w (batch, e) };
-  to_world (body2, constants->n, now.n);
+  double n[2];
+  to_world (body2, constants->n, n);
   to_world (body1, constants->s1, now.a);
-  now.t[0] = now.n[1], now.t[1] = -now.n[0];
   now.D[0] = body1->x + now.a[0] - body2->x, now.D[1] = body1->y + now.a[1] - body2->y;
-  now.na = now.n[0] * now.a[0] + now.n[1] * now.a[1], now.nD = now.n[0] * now.D[0] + now.n[1] * now.D[1];
-  now.ta = now.t[0] * now.a[0] + now.t[1] * now.a[1], now.tD = now.t[0] * now.D[0] + now.t[1] * now.D[1];
+  line_set_normal (&now, n[0], n[1]);
   return now;
 }
 
@@ -111,9 +117,8 @@ PER_ELEMENT (line_gamma_q, line, 6) {
 }
 
 PER_ELEMENT (line_gamma_v, line, 6) {
-  const double v[6] = {
-    now.body1->vx, now.body1->vy, now.body1->omega, now.body2->vx, now.body2->vy, now.body2->omega
-  };
+  double v[6];
+  velocities_of (now.body1, now.body2, v);
   line_multiply_H (&now, -2, v, out);
 }
 

@@ -605,6 +605,19 @@ static int compile_outputs (compilation *job) {
   return PW_OK;
 }
 
+/* The system owns the paths of elements, too: it outlives the model. */
+static int compile_paths (const compilation *job) {
+  pw_system *s = job->s;
+  const pw_model *m = job->m;
+  s->path = pw_arena_alloc (&s->arena, (size_t)m->elements * sizeof *s->path);
+  if (s->path == NULL) return compile_no_memory (job);
+  for (const pw_element *e = m->element; e < m->element + m->elements; e++) {
+    pw_path *const *path = pw_field_at (e->kind, e->definition, PW_TRACK, 0);
+    if (path && *path) s->path[s->paths++] = pw_path_share (*path);
+  }
+  return PW_OK;
+}
+
 static int compile_constant_forces (const compilation *job) {
   pw_system *s = job->s;
   int constant = 0;
@@ -634,6 +647,7 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_limits (job);
   if (status == PW_OK) status = compile_ledger (job);
   if (status == PW_OK) status = compile_outputs (job);
+  if (status == PW_OK) status = compile_paths (job);
   return status == PW_OK ? compile_constant_forces (job) : status;
 }
 
@@ -658,6 +672,7 @@ void pw_system_free (pw_system *s) {
   if (s == NULL) return;
   pw_close_signals (s->source, s->source ? s->sources : 0);
   pw_close_outputs (s->output, s->outputs);
+  for (int i = 0; i < s->paths; i++) pw_path_close (s->path[i]);
   pw_arena_free (&s->arena);
   free (s->batch);
   free (s);

@@ -27,7 +27,7 @@ size_t pw_field_bytes (pw_field_type type) {
   static const size_t bytes[] = {
     [PW_NUMBER] = sizeof (double), [PW_POINT] = sizeof (double[2]),  [PW_VECTOR] = sizeof (double[2]),
     [PW_BODY] = sizeof (char *),   [PW_SIGNAL] = sizeof (pw_signal), [PW_CHOICE] = sizeof (int),
-    [PW_TEXT] = sizeof (char *)
+    [PW_TEXT] = sizeof (char *),   [PW_TRACK] = sizeof (pw_path *)
   };
   return (size_t)type < sizeof bytes / sizeof *bytes ? bytes[type] : 0;
 }
@@ -464,6 +464,10 @@ static void model_copy_signal (pw_model *m, pw_signal *s) {
   s->table.value = model_copy (m, s->table.value, (size_t)s->table.count * sizeof (double));
 }
 
+static void model_close_path (void *path) {
+  pw_path_close (path);
+}
+
 static int model_check_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];
@@ -490,6 +494,9 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
     *body = model_copy_text (m, *body);
   }
   for (int i = 0; (text = pw_field_mutable (kind, copy, PW_TEXT, i)) != NULL; i++) *text = model_copy_text (m, *text);
+  pw_path **path;
+  for (int i = 0; (path = pw_field_mutable (kind, copy, PW_TRACK, i)) != NULL; i++)
+    if (*path) pw_model_keep (m, pw_path_share (*path), model_close_path);
   pw_signal *signal;
   for (int i = 0; (signal = pw_field_mutable (kind, copy, PW_SIGNAL, i)) != NULL; i++) model_copy_signal (m, signal);
   m->element[m->elements++] = (pw_element){ kind, copy };

@@ -226,6 +226,27 @@ double pw_path_length (const pw_path *p) {
   return p->length;
 }
 
+/* 1 if a disc on the left that touches the path at an arc length does not fit there. */
+static int path_is_tight (const pw_path *p, double s, double radius) {
+  pw_path_place at, other;
+  pw_path_at (p, s, &at);
+  pw_path_nearest (p, at.x - radius * at.sin, at.y + radius * at.cos, INFINITY, &other);
+  return !(at.curvature[0] * radius < 1) || !(other.offset > radius * (1 - 1e-9));
+}
+
+double pw_path_tight (const pw_path *p, double radius) {
+  if (!(radius > 0)) return NAN;
+  for (int i = 0; i < 4 * p->pieces; i++) {
+    const double s = p->piece[i / 4].s + i % 4 * p->piece[i / 4].size / 4;
+    if (path_is_tight (p, s, radius)) return s;
+  }
+  for (double s = p->length; !p->closed && s > p->length / 1000; s /= 2) {
+    if (path_is_tight (p, -s, radius)) return -s;
+    if (path_is_tight (p, p->length + s, radius)) return p->length + s;
+  }
+  return NAN;
+}
+
 int pw_path_is_smooth (const pw_path *p) {
   return !p->is_linear;
 }

@@ -98,6 +98,8 @@ struct pw_system {
   pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
   pw_source *source;       /* sources: those of limits, then those of elements, ordered by batch */
   pw_entry *entry;         /* entries; losses by impacts alone are the last ones */
+  pw_path **path;          /* paths: of elements */
+  int paths;
   pw_compiled_output *output; /* outputs */
   int outputs;
   unsigned output_types; /* of the columns that they read, as pw_compiled_output.types */

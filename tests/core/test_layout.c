@@ -202,6 +202,7 @@ LAYOUT_VALUE (PW_VECTOR, 2);
 LAYOUT_VALUE (PW_BODY, 3);
 LAYOUT_VALUE (PW_SIGNAL, 4);
 LAYOUT_VALUE (PW_CHOICE, 5);
+LAYOUT_VALUE (PW_TRACK, 7);
 LAYOUT_VALUE (PW_FORCE, 0);
 LAYOUT_VALUE (PW_HOLONOMIC, 1);
 LAYOUT_VALUE (PW_NONHOLONOMIC, 2);
@@ -235,7 +236,7 @@ TEST (definitions) {
     { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
     { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
     { "stop", 0x140184392f9eeb3b },          { "rope", 0x63fe52bab6421076 },
-    { "contact", 0x2b9104de018ef324 },       { "freewheel", 0x1b30733283cdb584 },
+    { "contact", 0xe6991d720708c124 },       { "freewheel", 0x1b30733283cdb584 },
     { "drive", 0x411a773ee985283e },         { "wheel", 0x44c28886978b8995 },
     { "rolling-wheel", 0x62087bb54a6fb124 }, { "steered-wheel", 0x61914357e448d9d4 },
     { "speed", 0x1dcb4d3e4aa0019 },          { "pfaffian", 0xd67d402c10e7ea82 },

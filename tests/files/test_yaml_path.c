@@ -297,6 +297,29 @@ TEST (included) {
   assert_non_null (strstr (cli_err, "\"road\" is a path"));
 }
 
+/* A contact names a path, also in an included file; `show --yaml` keeps the motion to the bit. */
+TEST (contact) {
+  double q[2][3], v[2][3];
+  cli_write ("hill.yaml",
+             "pinwheel: 1\npaths: [{name: hill, points: [[-1, 0], [0, 1], [1, 0.8], [2, -1]], interpolation: "
+             "cubic}]\nbodies: [{name: ball, mass: 1, inertia: 0.1, start: {y: 1.5}}]\n"
+             "elements:\n  - {gravity: g, acceleration: [0, -9.81]}\n  - {contact: C, body: [ball, ground], "
+             "at: [[0, 0], [0, 0]], radius: 0.1, path: hill, mu: 0.3, restitution: 0.5}\n");
+  cli_write ("world.yaml", "pinwheel: 1\ninclude: [{file: hill.yaml, prefix: a_}]\n");
+  cli_good ("pinwheel show --yaml @/world.yaml >@/again.yaml");
+  for (int i = 0; i < 2; i++) {
+    gallery_scene x = gallery_load (cli_path (i ? "again.yaml" : "hill.yaml"), NULL);
+    runs_state (x.system, "erk8", NULL, 1, q[i], v[i], NULL);
+    gallery_close (&x);
+  }
+  check_bits ("positions", q[0], q[1], 3);
+  check_bits ("velocities", v[0], v[1], 3);
+  assert_true (fabs (q[0][0]) > 0.05); /* it bounced off the slope */
+  cli_good ("sed 's/path: a_hill/path: hill/' @/again.yaml >@/bad.yaml");
+  assert_int_equal (cli_run ("pinwheel run @/bad.yaml"), 2);
+  assert_non_null (strstr (cli_err, "error: contact a_C: path: there is no path \"hill\"; did you mean \"a_hill\"?"));
+}
+
 /* A run is not resumed after a point of its path, far ahead, has changed. */
 TEST (resume) {
   static const char track[] = "x,y\n0,0\n9,0\n900,0\n";

@@ -173,10 +173,12 @@ static int gallery_default (void *context, const char *model, const char *path) 
   pw_sample x = runs_to (r, run.t_end);
   double size = 1 + fabs (x.kinetic) + fabs (x.potential) + fabs (x.work) + fabs (x.loss);
   check_below ("balance", fabs (x.balance) / size, 1e6 * H4, "h^4 times a rate");
-  assert_int_equal (pw_verify (s, pw_run_scale (r), x.t, x.q, x.v, x.a, x.lambda, &off), PW_OK);
-  check_below ("verifier, position", off.position.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
-  check_below ("verifier, velocity", off.velocity.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
-  check_below ("verifier, force", off.force.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+  if (s->limit == NULL) { /* the verifier knows no limits of reactions */
+    assert_int_equal (pw_verify (s, pw_run_scale (r), x.t, x.q, x.v, x.a, x.lambda, &off), PW_OK);
+    check_below ("verifier, position", off.position.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+    check_below ("verifier, velocity", off.velocity.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+    check_below ("verifier, force", off.force.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+  }
   runs_close (r, s);
   pw_file_close (f);
   return 0;

@@ -61,12 +61,13 @@ static void shapes_add_points (pw_plots *plots, const pw_element *e, const int *
   }
 }
 
-/* The value of a number or a choice of an element; 0 if it has no such field. */
+/* The value of a number or a choice of an element, 1 for a path; 0 if it has no such field. */
 static double shapes_field (const pw_kind *kind, const void *definition, const char *name, size_t length) {
   const pw_field *f = kind->fields;
   while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
   if (f->name == NULL) return 0;
   const void *at = (const char *)definition + f->offset;
+  if (f->type == PW_TRACK) return *(pw_path *const *)at != NULL;
   return f->type == PW_NUMBER ? *(const double *)at : f->type == PW_CHOICE ? *(const int *)at : 0;
 }
 
@@ -273,10 +274,10 @@ void pw_plot_measure (pw_plots *plots) {
  * travel of p1 along e.  "@NAME" in place of x or y is the length in that field of the element.
  *
  * "o a x y r" is a circle of radius u r around that point; "g1" and "g2" are the pitch circles of gears with the axles
- * p1 and p2 and the field `ratio`; "h y" is a hatching below the rail at this y.  A stroke whose last vertex is its
- * first encloses an area, which hides what is below.  "d n NAME" is the disc of radius NAME of body n, around its
- * point: it is drawn with the body.  "NAME:" before a stroke: it is drawn if that field is not zero or, of an optional
- * number, given; "NAME=2:": if it is 2; "ground:": if the last body is the ground. */
+ * p1 and p2 and the field `ratio`; "h y" is a hatching below the rail at this y; "p" is the path of the element.  A
+ * stroke whose last vertex is its first encloses an area, which hides what is below.  "d n NAME" is the disc of radius
+ * NAME of body n, around its point: it is drawn with the body.  "NAME:" before a stroke: it is drawn if that field is
+ * not zero or, of an optional number, given; "NAME=2:": if it is 2; "ground:": if the last body is the ground. */
 
 enum { SYMBOL_CIRCLE = 24 }; /* sides of the polygon of a circle */
 #define SYMBOL_HATCH 0.6     /* distance of the strokes of a hatching, in units of symbols */
@@ -355,6 +356,34 @@ static int symbol_hatch (double x0, double x1, double y, double at, int upright,
   return strokes;
 }
 
+/* The path of an element between its ends, relative to p2, and hatching on its right; room: for PLOT_STROKES / 2
+ * strokes at least.  Returns the number of strokes. */
+static int symbol_path (const pw_plot_link *link, double u, int room, pw_plot_stroke *stroke) {
+  enum { PIECES = 10, INTERVALS = PLOT_VERTICES - 1 };
+  const pw_path *path = *(pw_path *const *)pw_field_at (link->kind, link->definition, PW_TRACK, 0);
+  const double length = pw_path_length (path);
+  const int hatches = (int)fmin (room - PIECES, length / u / SYMBOL_HATCH);
+  pw_path_place at;
+  for (int n = 0; n < PIECES; n++) {
+    stroke[n] = (pw_plot_stroke){ PLOT_VERTICES, 0, 0, { { 0 } } };
+    for (int k = 0; k < PLOT_VERTICES; k++) {
+      pw_path_at (path, length * (n * INTERVALS + k) / (PIECES * INTERVALS), &at);
+      memcpy (stroke[n].vertex[k], (const double[]){ 1, at.x / u, at.y / u, 0 }, sizeof *stroke[n].vertex);
+    }
+  }
+  for (int n = 0; n < hatches; n++) {
+    const double side = 0.4 * length / u / hatches;
+    pw_path_at (path, length * (n + 0.5) / hatches, &at);
+    stroke[PIECES + n] =
+        (pw_plot_stroke){ 2,
+                          0,
+                          0,
+                          { { 1, at.x / u, at.y / u },
+                            { 1, at.x / u + side * (at.sin - at.cos), at.y / u - side * (at.sin + at.cos) } } };
+  }
+  return PIECES + hatches;
+}
+
 /* The ends of a rail along e from p2, and the origin of the last body, in units of symbols. */
 typedef struct {
   double low, high, origin;
@@ -377,6 +406,8 @@ static int symbol_next (const pw_plot_link *link, double u, symbol_rail rail, co
     const int second = (*text)[1] == '2';
     double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
     symbol_circle (stroke, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
+  } else if (**text == 'p') {
+    *strokes = drawn && symbol_field (link, "path", 4) != 0 ? symbol_path (link, u, room, stroke) : 0;
   } else if (**text == 'h' && ++*text && symbol_numbers (link, u, text, number, 1) == 1) {
     *strokes = drawn ? symbol_hatch (rail.low, rail.high, number[0], rail.origin, 0, room, stroke) : 0;
   } else if (**text == 'o' && ++*text && symbol_numbers (link, u, text, number, 4) == 4) {

@@ -10,8 +10,8 @@ from . import _library as lib
 from .results import _nearest
 
 _SHAPES = {lib.PW_NUMBER: "float", lib.PW_POINT: "[x, y]", lib.PW_VECTOR: "[x, y]", lib.PW_BODY: "str",
-           lib.PW_SIGNAL: "float, dict or function of the time", lib.PW_CHOICE: "str", lib.PW_TEXT: "str"}
-_DEFAULTS = {lib.PW_NUMBER: 0.0, lib.PW_POINT: [0, 0], lib.PW_VECTOR: [0, 0], lib.PW_SIGNAL: 0.0, lib.PW_TEXT: ""}
+           lib.PW_SIGNAL: "float, dict or function of the time", lib.PW_CHOICE: "str", lib.PW_TEXT: "str", lib.PW_TRACK: "str"}
+_DEFAULTS = {lib.PW_NUMBER: 0.0, lib.PW_POINT: [0, 0], lib.PW_VECTOR: [0, 0], lib.PW_SIGNAL: 0.0, lib.PW_TEXT: "", lib.PW_TRACK: None}
 
 
 class Body(dict):
