@@ -537,9 +537,11 @@ static void conclusion_print (const pw_compare *compare) {
 /* ---- The rows ---- */
 
 enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
-#define COMPARE_FEW 3          /* timed runs of a row, at least, unless --repeats is less or they exceed the limit */
+#define COMPARE_FEW 3          /* timed runs of a row, unless --repeats is less or they exceed the limit, */
+#define COMPARE_FEWEST 2       /* and those whose times agree and sum up to COMPARE_ENOUGH */
+#define COMPARE_QUIET 0.05     /* largest spread of times that agree, over the least one */
 #define COMPARE_ENOUGH 0.1     /* total processor time [s] of a row after which no further run is timed */
-#define COMPARE_HOPELESS 200   /* cost of a run over that of the reference, from which on it is abandoned */
+#define COMPARE_HOPELESS 100   /* cost of a run over that of the reference, from which on it is abandoned */
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
 #define COMPARE_DECADE 1.6 /* factor of the cost if a tolerance is divided by ten, of a method of order 5: 10^(1/5) */
@@ -654,16 +656,23 @@ static double compare_order (const pw_compare *compare, const pw_row *row) {
   return order > 0 && fabs (order - coarser_order) <= COMPARE_AGREE * order ? order : NAN;
 }
 
+/* 1 if n sorted times of a row with this sum suffice: they agree, or take long. */
+static int compare_is_enough (const double *cpu, int n, double sum) {
+  const int agree = n > 0 && cpu[n - 1] - cpu[0] <= COMPARE_QUIET * cpu[0], is_long = sum > COMPARE_ENOUGH;
+  return (n >= COMPARE_FEW && (agree || is_long)) || (n >= COMPARE_FEWEST && agree && is_long);
+}
+
 /* Measures runs without samples; the processor time of the row is their median. */
 static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
-  while (n < compare->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= compare->study.cpu_limit) {
+  while (n < compare->repeats && sum <= compare->study.cpu_limit) {
     int status = compare_run (&compare->study, row, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = row->cpu;
+    gsl_sort (cpu, 1, (size_t)n);
+    if (compare->repeats_text == NULL && compare_is_enough (cpu, n, sum)) break;
   }
-  gsl_sort (cpu, 1, (size_t)n);
   row->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
   row->value[COLUMN_REPEATS] = n;
   if (n < 2) return PW_OK;
@@ -820,12 +829,12 @@ static const struct poptOption compare_options[] = {
                   "Step sizes of fixed-step methods [s], halved each time (default 0.1:1e-4)"),
   PW_TEXT_OPTION (
       pw_cli_line, limit, "limit", 0, "SECONDS",
-      "Processor time of a single run; runs expected to take longer are skipped (default 10, at most 200 times "
+      "Processor time of a single run; runs expected to take longer are skipped (default 10, at most 100 times "
       "that of a computed reference)"),
   PW_TEXT_OPTION (
       pw_compare, repeats_text, "repeats", 0, "N",
-      "Timed repetitions of each run, at most 99, of which the median is reported (default 9, or those that "
-      "fit into a tenth of a second, but 3)"),
+      "Timed repetitions of each run, at most 99, of which the median is reported (default: 3 that agree to 5 %, "
+      "else up to 9 within a tenth of a second; 2 of long runs)"),
   PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N",
                   "Number of methods that run at a time, each on a physical core of its own (default: all cores)"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
