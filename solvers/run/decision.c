@@ -5,7 +5,11 @@
 #include "decision.h"
 
 #define DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
-enum { DECISION_MOST = 5000 };   /* combinations of modes that are tried, at about a microsecond each */
+enum {
+  DECISION_MOST = 5000, /* combinations of modes that are tried, at about a microsecond each */
+  DECISION_PASSES = 10000 /* of projected gradients */,
+  DECISION_LATE = 500
+};
 
 int pw_decision_apart (const pw_decision *d, int k) {
   return d->normal[k] >= 0 && d->trial[d->normal[k]] != 0;
@@ -145,9 +149,9 @@ int pw_decision_pivot (pw_decision *d, int skips) {
 }
 
 /* A projected-gradient step for the circle of the equations k, k + 1: y = x + z / trace (A), of their diagonal block.
- * If y is within the limit, both hold from now on.  Otherwise x has the direction of y and the length of the limit.
- * Returns the change of the direction, or 2 if the mode changes. */
-static double decision_step_on_circle (pw_decision *d, int k) {
+ * If y is within the limit, and `late` is 0, both hold from now on.  Otherwise x has the direction of y and the length
+ * of the limit.  Returns the change of the direction, or 2 if the mode changes. */
+static double decision_step_on_circle (pw_decision *d, int k, int late) {
   double y[2], change = 0;
   for (int m = 0; m < 2; m++) {
     const double *row = d->A + (k + m) * d->n;
@@ -157,7 +161,7 @@ static double decision_step_on_circle (pw_decision *d, int k) {
   }
   const double size = hypot (y[0], y[1]), most = d->hi[k] * (1 + (d->trial[k] ? -1 : 1) * 1e-13);
   if (size <= most && (d->trial[k] == 0 || size == 0)) return 0;
-  if (size < most) return d->trial[k] = d->trial[k + 1] = 0, 2;
+  if (size < most && !(late && size > 0.5 * most)) return d->trial[k] = d->trial[k + 1] = 0, 2;
   if (d->trial[k] == 0) change = 2;
   for (int m = 0; m < 2; m++) {
     change = fmax (change, fabs (y[m] / size - d->towards[k + m]));
@@ -215,6 +219,17 @@ static int decision_enumerate (pw_decision *d, int found, int *count) {
   return *count == 1 ? pw_decision_solve (d, 1) : PW_RETRY;
 }
 
+/* 1 if circles at their limits slide along their multipliers, or do not slide. */
+static int decision_circles_agree (const pw_decision *d) {
+  const double size = decision_size (d);
+  for (int k = 0; k < d->n; k++) {
+    if (d->limit[d->list[k]].circle != 1 || d->trial[k] == 0 || d->fixed[k]) continue;
+    const double along = pw_decision_z (d, k) * d->towards[k] + pw_decision_z (d, k + 1) * d->towards[k + 1];
+    if (along / sqrt (d->A[k * d->n + k] + d->A[(k + 1) * d->n + k + 1]) < -1e-9 * size) return 0;
+  }
+  return 1;
+}
+
 /* The first pass: from the present modes on, as friction requires; otherwise from all that hold on, so that multipliers
  * are not larger than others that depend on them require. */
 static int decision_begin (pw_decision *d, int coupled, int *count) {
@@ -226,21 +241,23 @@ static int decision_begin (pw_decision *d, int coupled, int *count) {
 }
 
 /* Projected gradients for circles (Goldstein 1964, Convex programming in Hilbert space) alternate with pivoting for the
- * other equations. */
+ * other equations.  Where equations depend on each other, which circles are at their limits may alternate, too: late
+ * ones that are near it then stay there. */
 int pw_decide (pw_decision *d, int *count) {
   int coupled = 0, circles = 0;
   for (int k = 0; k < d->n; k++) coupled |= d->normal[k] >= 0, circles |= d->limit[d->list[k]].circle;
   *count = -1;
   int status = decision_begin (d, coupled, count);
   double before = INFINITY, change = circles ? INFINITY : 0;
-  for (int pass = 0; pass < 10000 && status == PW_OK && change != 0; pass++) {
+  for (int pass = 0; pass < DECISION_PASSES && status == PW_OK && change != 0; pass++) {
     if (pass > 0) status = pw_decision_pivot (d, 1);
     if (status != PW_OK && coupled) status = decision_enumerate (d, 0, count);
     before = change, change = 0;
     for (int k = 0; k < d->n && status == PW_OK; k++)
-      if (d->limit[d->list[k]].circle == 1) change = fmax (change, decision_step_on_circle (d, k));
+      if (d->limit[d->list[k]].circle == 1)
+        change = fmax (change, decision_step_on_circle (d, k, pass > DECISION_LATE));
     if (change < 1e-12 && change >= before) change = 0;
   }
-  if (change != 0) return PW_RETRY;
+  if (change != 0 || !decision_circles_agree (d)) return PW_RETRY;
   return coupled && circles && status == PW_OK ? decision_enumerate (d, 1, count) : status;
 }

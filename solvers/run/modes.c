@@ -414,6 +414,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps && !misses &&
                       !(parts && u > PW_MODES_SMALL);
     const int slides = x->mode[i] && !rolls && u > PW_MODES_SMALL;
+    for (int k = i; k < i + equations && slides; k++) x->spare[k] = x->still[k] = 0;
     if (open || (slides && on < 0)) continue;
     const double unit = on < 0 ? x->force_unit[i] : x->limit[i].most;
     const double tighter = x->mode[i] == 0 && x->triggered[i] ? MODES_TIGHTER * unit : 0;
