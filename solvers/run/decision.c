@@ -96,14 +96,15 @@ static double decision_violation (const pw_decision *d, int k, double size, int 
   *to = d->x[k] > hi ? 1 : -1;
   if (d->limit[d->list[k]].circle) return 0; /* decision_step_on_circle */
   if (d->fixed[k] || pw_decision_apart (d, k)) return 0;
-  if (d->redundant[k]) { /* it holds only if the equations on which it depends imply z = 0 */
+  if (d->redundant
+          [k]) { /* it holds only if the equations on which it depends imply z = 0; otherwise it changes first */
     const double z = pw_decision_z (d, k) / unit;
     *to = isinf (lo) || (!isinf (hi) && z > 0) ? 1 : -1;
-    return *to * z - 1e-9 * size;
+    return 1e6 * (*to * z - 1e-9 * size);
   }
   if (d->trial[k] == 0) return unit * fmax (d->x[k] - hi, lo - d->x[k]);
   *to = 0;
-  return -d->trial[k] * pw_decision_z (d, k) / unit - 1e-12 * size;
+  return -d->trial[k] * pw_decision_z (d, k) / unit - 2 * DECISION_DEPENDENT * size; /* z of nearly dependent ones */
 }
 
 /* Sets the given multipliers, except those of friction, which pw_decision_solve sets. */
