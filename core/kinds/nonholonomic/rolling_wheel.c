@@ -159,47 +159,28 @@ static const pw_quantity rolling_coordinate[] = {
   { "spin", "rad", "spin_rate", "angle about the axle; increases when rolling along the heading" },
 };
 
-#define ROLLING_SYMBOL "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5"
+/* Members of the tables of a rolling wheel and of one that may slide. */
+#define ROLLING                                                                                                       \
+  .name = "rolling-wheel", .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",                            \
+  TYPE (rolling, pw_rolling_wheel, rolling), .bodies = 1, .internal = 1, .signals = 1, .level = PW_NONHOLONOMIC,      \
+  .reaction = rolling_reaction, .coordinate = rolling_coordinate, .force = rolling_force, .force_u = rolling_force_u, \
+  .power = rolling_power, .contact = rolling_contact
 
 const pw_kind pw_kind_rolling_wheel = {
-  .name = "rolling-wheel",
+  ROLLING,
   .about = "a wheel that rolls without slip, free or driven by a torque about its axle",
-  .symbol = ROLLING_SYMBOL,
-  TYPE (rolling, pw_rolling_wheel, rolling),
-  .bodies = 1,
-  .internal = 1,
   .rows = 2,
-  .signals = 1,
-  .level = PW_NONHOLONOMIC,
-  .reaction = rolling_reaction,
-  .coordinate = rolling_coordinate,
   CONSTRAINT (rolling),
   .J_gamma = rolling_J_gamma,
-  .force = rolling_force,
-  .force_u = rolling_force_u,
-  .power = rolling_power,
-  .contact = rolling_contact,
   .exact = &pw_kind_slipping_wheel,
   .is_exact = rolling_slips,
 };
 
 const pw_kind pw_kind_slipping_wheel = {
-  .name = "rolling-wheel",
+  ROLLING,
   .about = "a wheel with a brake that rolls up to a largest force",
-  .symbol = ROLLING_SYMBOL,
-  TYPE (rolling, pw_rolling_wheel, rolling),
-  .bodies = 1,
-  .internal = 1,
   .rows = 3,
-  .signals = 1,
-  .level = PW_NONHOLONOMIC,
-  .reaction = rolling_reaction,
-  .coordinate = rolling_coordinate,
   CONSTRAINT (slipping),
   .limits = slipping_limits,
-  .force = rolling_force,
-  .force_u = rolling_force_u,
-  .power = rolling_power,
   .loss = slipping_loss,
-  .contact = rolling_contact,
 };
