@@ -253,4 +253,12 @@ TEST (ladder) {
       "--step-ladder 0.0000000000000000000000000000000000000000000000001:1: expected FROM:TO");
 }
 
+/* Of elements with several limited reactions, events name the reaction. */
+TEST (events) {
+  cli_good ("pinwheel run drifting-car -t 2");
+  assert_non_null (strstr (cli_out, " t = 1 s: rolling-wheel rear.N slides\n"));
+  assert_non_null (strstr (cli_out, " s: rolling-wheel rear.B holds\n"));
+  assert_non_null (strstr (cli_out, " s: steered-wheel front slides-\n"));
+}
+
 const check_fixture fixture = { cli_setup, cli_teardown };

@@ -234,6 +234,13 @@ static void report_errors (const pw_reference_error *errors, const char *gaps, i
   if (*gaps) pw_cli_print (stdout, "  the reference solution contains %s\n", gaps);
 }
 
+/* The element of a constraint equation; of an element with several, the reaction: "rolling-wheel rear.B". */
+static char *report_equation (const pw_system *system, int row, char *buffer, size_t size) {
+  const pw_element_info element = pw_system_element (system, pw_system_row_element (system, row));
+  if (element.kind->rows == 1) return pw_system_row_name (system, row, buffer, size);
+  return pw_print (buffer, size, "%s %s", element.kind->name, PW_NAME (pw_system_reaction_name, system, row));
+}
+
 /* The last events; of a scene without limits nothing. */
 static void report_events (const pw_system *system, const pw_summary *summary) {
   const int first = summary->events > REPORT_EVENTS ? summary->events - REPORT_EVENTS : 0;
@@ -245,7 +252,7 @@ static void report_events (const pw_system *system, const pw_summary *summary) {
   }
   pw_cli_print (stdout, "  %s%s\n", PW_COUNTED (summary->events, "event"), first > 0 ? "; the last ones:" : "");
   for (const pw_event *e = summary->event + first; e < summary->event + summary->events; e++)
-    pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15), PW_NAME (pw_system_row_name, system, e->row),
+    pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15), PW_NAME (report_equation, system, e->row),
                   pw_system_mode_name (system, e->row, e->to),
                   e->impact ? PW_PRINTED (60, ", impulse %s", PW_DIGITS (e->impulse, 8)) : "");
 }
