@@ -179,12 +179,16 @@ typedef struct pw_model pw_model;
 
 /* A rigid body.  The origin of its frame is its centre of mass.  It may be massless. */
 typedef struct {
-  const char *name;     /* unique among bodies and elements; "ground" is reserved */
-  double mass, inertia; /* [kg], about the centre of mass [kg m^2], >= 0 */
-  double start[3];      /* initial x, y [m], phi [rad] */
-  double rate[3];       /* initial vx, vy [m/s], omega [rad/s] */
-  unsigned specified;   /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
+  const char *name;           /* unique among bodies and elements; "ground" is reserved */
+  double mass, inertia;       /* [kg], about the centre of mass [kg m^2], >= 0 */
+  double start[3];            /* initial x, y [m], phi [rad] */
+  double rate[3];             /* initial vx, vy [m/s], omega [rad/s] */
+  unsigned specified;         /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
+  int corners;                /* of its outline in figures: 3 to PW_MOST_CORNERS, or 0 */
+  const double (*outline)[2]; /* these corners in the body's frame [m]; NULL: the hull of its points */
 } pw_body;
+
+enum { PW_MOST_CORNERS = 2000 };
 
 /* Initial values that a body specifies: the constraints are satisfied by changing the others rather than these. */
 enum {

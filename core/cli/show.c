@@ -139,6 +139,9 @@ static void yaml_body (const pw_body *b) {
   if (!yaml_is_zero (b->inertia)) printf (", inertia: %s", YAML_NUMBER (b->inertia));
   yaml_triple ("start", state, b->start, b->specified);
   yaml_triple ("rate", state + 3, b->rate, b->specified >> 3);
+  for (int i = 0; i < b->corners; i++)
+    printf ("%s[%s, %s]%s", i ? ", " : ", outline: [", YAML_NUMBER (b->outline[i][0]), YAML_NUMBER (b->outline[i][1]),
+            i + 1 < b->corners ? "" : "]");
   putchar ('}');
   /* a comment on values that are written although the model does not specify them, as reading the text will */
   const char *separator = "  # the model does not specify ";

@@ -24,6 +24,17 @@ typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED, PW_GAPLESS } pw_gaps;
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, unsigned char *missing, int *rows, pw_error *error);
 
+/* ---- Outlines of bodies in drawings (svg.c) ---- */
+
+/* Points; zero-initialised, none.  Free `point`. */
+typedef struct {
+  double (*point)[2];
+  size_t count, room;
+} pw_corners;
+/* Appends the corners of the first path, polygon or polyline of a drawing, y upwards.  Returns why there are none, "it
+ * has ...", or ""; PW_OK or PW_RESOURCE in *status. */
+const char *pw_svg_outline (const char *text, pw_corners *corners, int *status);
+
 /* ---- Units (columns.c) ---- */
 
 /* A known unit: "mm" is "1e-3" of "m".  The first four are the base units. */

@@ -81,8 +81,8 @@ static int build_bar (pw_reader *r, const pw_node *name, const pw_node *from, co
 }
 
 static int build_body (pw_reader *r, const pw_node *node) {
-  static const char *const keys[] = { "name", "mass", "inertia", "start", "rate", NULL };
-  static const char *const bar_keys[] = { "bar", "mass", "from", "to", "rate", NULL };
+  static const char *const keys[] = { "name", "mass", "inertia", "start", "rate", "outline", NULL };
+  static const char *const bar_keys[] = { "bar", "mass", "from", "to", "rate", "outline", NULL };
   static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
   const pw_node *v[sizeof keys / sizeof *keys];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
@@ -111,7 +111,7 @@ static int build_body (pw_reader *r, const pw_node *node) {
       body.specified |= 1u << (3 * i + k);
     }
   }
-  if (r->error->status != PW_OK) return r->error->status;
+  if (r->error->status != PW_OK || pw_yaml_outline (r, v[5], &body) != PW_OK) return r->error->status;
   const char *alone = pw_place_body (r->place, &body);
   if (*alone)
     return read_fail (r, name->at, "body %.60s: in a file placed at an angle, %s are given both or neither", body.name,

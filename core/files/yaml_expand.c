@@ -294,7 +294,7 @@ static int files_tables (const pw_yaml *y, const pw_node *node, pw_yaml_each *ea
     if (key) n = key->next; /* its value */
     const char *name = key && key->type == PW_YAML_SCALAR ? key->text : "";
     if (strcmp (name, "let") == 0 || strcmp (name, "set") == 0) continue; /* names of numbers */
-    if (strcmp (name, "file") == 0 && n->type == PW_YAML_SCALAR) {
+    if ((strcmp (name, "file") == 0 || strcmp (name, "outline") == 0) && n->type == PW_YAML_SCALAR) {
       pw_yaml_part (y, n->at, part);
       char *slash = strrchr (part, '/');
       stop = each (context, pw_path (path, "%s/%.*s%s", y->folder, slash ? (int)(slash - part) + 1 : 0, part, n->text));

@@ -190,6 +190,8 @@ int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal);
 int pw_yaml_name_path (const pw_reader *r, pw_scope *scope, const char *prefix, const char *name, pw_path *path);
 /* Reads a path, of which the following expressions can use functions. */
 int pw_yaml_path (pw_reader *r, const pw_node *node);
+/* Reads the outline of a body; the node may be NULL. */
+int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body);
 
 /* Reads the unit of a state or output, which are displayed in SI units, like all columns. */
 int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit);

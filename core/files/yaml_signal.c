@@ -377,19 +377,28 @@ static int pairs_list (pw_reader *r, const pw_node *list, const char *form, pair
   return PW_OK;
 }
 
+/* Opens a file that the model names; NULL after an error. */
+static FILE *pairs_open (pw_reader *r, const pw_node *node, const char **name) {
+  char path[PW_PATH], from_model[PW_PATH];
+  const char *reason;
+  if (pw_yaml_text (r, node, r->label, name) != PW_OK) return NULL;
+  errno = 0;
+  FILE *f = pw_yaml_find (r->y, node->at, *name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
+  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
+    pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, *name, reason);
+  else if (f == NULL)
+    read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, *name, reason);
+  return f;
+}
+
 /* Pairs in two columns of a file, NULL: by default, converted to these units. */
 static int pairs_file (pw_reader *r, const pw_node *node, const char *const column[2], const char *const unit[2],
                        pw_gaps gaps, pairs *p) {
-  char path[PW_PATH], from_model[PW_PATH];
-  const char *name, *reason;
+  const char *name;
   pw_error cause = { 0 };
   int rows;
-  if (pw_yaml_text (r, node, r->label, &name) != PW_OK) return r->error->status;
-  errno = 0;
-  FILE *f = pw_yaml_find (r->y, node->at, name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
-  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
-    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
-  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason);
+  FILE *f = pairs_open (r, node, &name);
+  if (f == NULL) return r->error->status;
   double *x = pw_columns_from_stream (f, name, column, unit, 2, gaps, NULL, &rows, &cause);
   fclose (f);
   if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text);
@@ -644,6 +653,76 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
   text->path = path;
   r->reference->paths++;
   return pw_yaml_name_path (r, r->scope, r->prefix, text->name, path);
+}
+
+/* ---- Outlines of bodies ---- */
+
+enum { OUTLINE_MAX_BYTES = 16 << 20 };
+
+/* Corners in a drawing. */
+static int outline_svg (pw_reader *r, const pw_node *node, pairs *p) {
+  const char *name, *why = "";
+  char *text = NULL;
+  size_t size;
+  pw_error cause = { 0 };
+  pw_corners points = { .count = 0 };
+  FILE *f = pairs_open (r, node, &name);
+  if (f == NULL) return r->error->status;
+  int status = pw_read_rest (f, OUTLINE_MAX_BYTES, name, "the limit for a drawing", &text, &size, &cause);
+  fclose (f);
+  if (status == PW_OK) why = pw_svg_outline (text, &points, &status);
+  p->x = pw_arena_alloc (r->arena, (points.count + 1) * sizeof *p->x);
+  p->y = pw_arena_alloc (r->arena, (points.count + 1) * sizeof *p->y);
+  for (size_t i = 0; p->x && p->y && i < points.count; i++) p->x[i] = points.point[i][0], p->y[i] = points.point[i][1];
+  p->count = (int)points.count;
+  free (points.point);
+  free (text);
+  if (status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text);
+  if (*why) return read_fail (r, node->at, "%s: %.60s: %s", r->label, name, why);
+  return status == PW_OK && p->x && p->y ? PW_OK : read_no_memory (r);
+}
+
+/* Scales the corners about the middle of their box, so that it has this width, and moves the middle to the origin. */
+static void outline_scale (pairs *p, double width) {
+  double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
+  for (int i = 0; i < p->count; i++) {
+    low[0] = fmin (low[0], p->x[i]), high[0] = fmax (high[0], p->x[i]);
+    low[1] = fmin (low[1], p->y[i]), high[1] = fmax (high[1], p->y[i]);
+  }
+  for (int i = 0; i < p->count && high[0] > low[0]; i++) {
+    p->x[i] = (p->x[i] - (low[0] + high[0]) / 2) * width / (high[0] - low[0]);
+    p->y[i] = (p->y[i] - (low[1] + high[1]) / 2) * width / (high[0] - low[0]);
+  }
+}
+
+int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body) {
+  static const char *const key[] = { "points", "file", "width", "at", NULL };
+  const pw_node *v[4] = { NULL };
+  double width = 0, at[2] = { 0 };
+  pairs p = { .count = 0 };
+  if (node == NULL) return PW_OK;
+  r->label = PW_PRINTED (140, "outline of body %.60s", body->name);
+  if (node->type != PW_YAML_MAP) v[node->type == PW_YAML_LIST ? 0 : 1] = node;
+  if (node->type == PW_YAML_MAP && pw_yaml_keys (r, node, key, "an outline", v) != PW_OK) return r->error->status;
+  if ((v[0] != NULL) == (v[1] != NULL))
+    return read_fail (r, node->at, "%s: expected points or a file, .svg or .csv", r->label);
+  const char *dot = v[1] && v[1]->type == PW_YAML_SCALAR ? strrchr (v[1]->text, '.') : NULL;
+  pw_yaml_number (r, v[2], PW_PRINTED (240, "%s: width", r->label), PW_POSITIVE, &width);
+  if (v[3]) pw_yaml_pair (r, v[3], PW_PRINTED (240, "%s: at", r->label), "numbers, [x, y]", at);
+  if (r->error->status != PW_OK) return r->error->status;
+  if (v[0])
+    pairs_list (r, v[0], "numbers, [x, y]", &p);
+  else if (dot && strcmp (dot, ".svg") == 0)
+    outline_svg (r, v[1], &p);
+  else
+    pairs_file (r, v[1], (const char *const[2]){ NULL }, (const char *const[2]){ "m", "m" }, PW_GAPLESS, &p);
+  if (pairs_count (r, node, &p, 1) != PW_OK) return r->error->status;
+  if (width > 0) outline_scale (&p, width);
+  double (*corner)[2] = pw_arena_alloc (r->arena, ((size_t)p.count + 1) * sizeof *corner);
+  if (corner == NULL) return read_no_memory (r);
+  for (int i = 0; i < p.count; i++) corner[i][0] = p.x[i] + at[0], corner[i][1] = p.y[i] + at[1];
+  body->outline = (const double (*)[2])corner, body->corners = p.count;
+  return PW_OK;
 }
 
 /* ---- Outputs ---- */

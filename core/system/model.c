@@ -227,7 +227,11 @@ int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
       return pw_fail (error, PW_INPUT, "model %s: body %s: %s = %g: expected %s", m->name, b->name, field[i].name,
                       field[i].value, expected);
   }
-  return PW_OK;
+  int finite = b->outline || b->corners == 0;
+  for (int i = 0; finite && i < b->corners; i++) finite = isfinite (b->outline[i][0]) && isfinite (b->outline[i][1]);
+  if (finite && (b->corners == 0 || (b->corners >= 3 && b->corners <= PW_MOST_CORNERS))) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: body %s: its outline has %d corners%s: expected 3 to %d", m->name,
+                  b->name, b->corners, finite ? "" : ", not all of them finite", PW_MOST_CORNERS);
 }
 
 /* names: of all bodies of the model, or NULL while it is built: then any name passes. */
@@ -445,6 +449,8 @@ int pw_add_body (pw_model *m, const pw_body *body) {
   pw_body *b = &m->body[m->bodies++];
   *b = *body;
   b->name = model_copy_text (m, body->name);
+  if (b->outline && b->corners > 0 && b->corners <= PW_MOST_CORNERS)
+    b->outline = model_copy (m, b->outline, (size_t)b->corners * sizeof *b->outline);
   return m->error.status;
 }
 

@@ -229,6 +229,49 @@ TEST (outline) {
   assert_non_null (strstr (page, "\"outline\": []}"));
 }
 
+/* Outlines of the model: points, and drawings, of which the first path counts, without definitions and comments. */
+TEST (own_outlines) {
+  static const char model[] = "pinwheel: 1\nbodies:\n"
+                              "  - {name: a, mass: 1, inertia: 1, rate: {vx: 1}, outline: %s}\n"
+                              "elements: [{marker: m, body: a, at: [0.5, 0.2]}]\n";
+  static const struct {
+    const char *outline, *drawing, *corners; /* as in the animation, or the beginning of a message */
+  } of[] = {
+    { "[[-1, -1], [1, -1], [0, 0], [1, 1]]", "", "[[-1, -1], [1, -1], [0, 0], [1, 1]]}" },
+    { "{points: [[0, 0], [4, 0], [4, 2]], width: 2, at: [1, 1]}", "", "[[0, 0.5], [2, 0.5], [2, 1.5]]}" },
+    { "o.svg", "<svg><polygon points='0,0 2,0 2,1-1-1'/></svg>", "[[0, 0], [2, 0], [2, -1], [-1, 1]]}" },
+    { "{file: o.svg}", "<svg><path d='M1,2h2V3 l-1 1-1-1zm4 4 1 1'/></svg>",
+      "[[1, -2], [3, -2], [3, -3], [2, -4], [1, -3]]}" },
+    { "{file: o.svg, width: 4}",
+      "<svg><!-- <path d='M0 0'/> --><defs><path d='M0 0'/></defs><g transform='translate(9)'>"
+      "<path id='d' d=\"m 8 8 L10.5.5e1 1e1,9\"/></g></svg>",
+      "[[-2, -1.6], [2, 3.2], [1.2, -3.2]]}" },
+    { "o.svg", "<svg><path d='M0 0Q6 0 6 6T12 12'/></svg>", "[[0, 0], [0.958333333, -0.0416666667], [1.83333333, " },
+    { "o.svg", "<svg><path d='M0 0C0 4 12 4 12 0S24-4 24 0'/></svg>", "[[0, 0], [0.236111111, -0.916666667], [0.8888" },
+    { "o.svg", "<svg><path d='M0 0A1 1 0 0 0 2 2'/></svg>", "o.svg: it has an arc: convert arcs to curves" },
+    { "o.svg", "<svg><path d='M0 0L1'/></svg>", "o.svg: a number of its path is missing" },
+    { "o.svg", "<svg><rect width='1'/></svg>", "o.svg: it has no path, polygon or polyline" },
+    { "o.svg", "<svg><g transform='rotate(9)'><path d='M0 0L1 1'/></g></svg>", "o.svg: it has transformations" },
+    { "o.svg", "<svg><path d='M0 0L1 1'/></svg>", "body a: its outline has 2 corners: expected 3 to 2000" },
+    { "none.svg", "", "outline of body a: cannot read \"none.svg\": No such file" },
+    { "{width: 1}", "", "outline of body a: expected points or a file, .svg or .csv" },
+  };
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+    const int wrong = *of[i].corners != '[';
+    cli_write ("o.yaml", check_text (model, of[i].outline));
+    cli_write ("o.svg", of[i].drawing);
+    assert_int_equal (cli_run ("pinwheel run @/o.yaml --t-end 1 --animate @/o.html"), wrong ? 2 : 0);
+    const char *text = wrong ? of[i].corners : check_text ("\"spokes\": [], \"outline\": %s", of[i].corners),
+               *found = wrong ? cli_err : cli_file ("o.html");
+    if (strstr (found, text) == NULL)
+      print_error ("no %s in %.300s\n", text, wrong ? cli_err : strstr (found, "\"outline"));
+    assert_non_null (strstr (found, text));
+  }
+  cli_write ("o.yaml", check_text (model, "[[-1, -1], [1, -1], [0.1, 0]]"));
+  cli_good ("pinwheel show --yaml @/o.yaml");
+  cli_shows (", outline: [[-1, -1], [1, -1], [0.1, 0]]}");
+}
+
 /* What gnuplot says when it fails is passed on, and summaries say that the command has failed. */
 TEST (gnuplot_fails) {
   cli_good ("mkdir @/bin && printf '#!/bin/sh\\necho no such colour >&2; exit 3\\n' >@/bin/gnuplot && chmod +x "

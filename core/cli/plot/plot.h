@@ -85,13 +85,14 @@ typedef struct {
   int *system_index;                 /* drawn: their indices among the bodies, or elements, of the system */
 } pw_tracks;
 
-/* Attachment points of a body, in its frame [m], and the convex hull of them and the centre of mass, counter-clockwise,
- * without corners if they are collinear. */
+/* Attachment points of a body, in its frame [m], and its outline: that of the model, or else the convex hull of them
+ * and the centre of mass, counter-clockwise, without corners if they are collinear. */
 typedef struct {
   int attachments, corners;
   int is_point_mass; /* 1: it has mass but no inertia */
   double attachment[PLOT_ATTACHMENTS][2];
-  double corner[PLOT_ATTACHMENTS + 1][2];
+  const double (*corner)[2];
+  double hull[PLOT_ATTACHMENTS + 1][2];
 } pw_plot_body;
 
 /* A disc of a body, drawn or the ground: x, y of its centre in the body's frame, radius [m]. */

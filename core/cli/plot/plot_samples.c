@@ -225,7 +225,8 @@ static int data_closeup (const pw_plots *plots) {
   pw_plot_box all = pw_plot_ground (plots), first = PLOT_EMPTY;
   double diagonal = 0;
   int n = 0, extended = plots->wheels.drawn > 0;
-  for (int b = 0; b < plots->bodies.drawn; b++) extended |= plots->shape[b].attachments > 0;
+  for (int b = 0; b < plots->bodies.drawn; b++)
+    extended |= plots->shape[b].attachments > 0 || plots->shape[b].corners > 0;
   if (!extended) return 0;
   for (int i = 0; i < plots->samples; i++) diagonal = pw_plot_extend (&all, plots, i);
   if (diagonal < FIGURES_FAR * plots->size) return 0;
@@ -325,7 +326,7 @@ static void data_wheels (FILE *f, const pw_plots *plots, int i) {
 /* Bodies of sample i that are points: without attachment points, or with mass but no inertia. */
 static void data_centres (FILE *f, const pw_plots *plots, int i) {
   for (int b = 0; b < plots->bodies.drawn; b++)
-    if (plots->shape[b].attachments == 0 || plots->shape[b].is_point_mass)
+    if ((plots->shape[b].attachments == 0 && plots->shape[b].corners == 0) || plots->shape[b].is_point_mass)
       data_vertex (f, pw_plot_track (plots, i, &plots->bodies, b), pw_plot_sample (plots, i)[PLOT_T], b, "\n");
 }
 

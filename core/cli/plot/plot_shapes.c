@@ -36,10 +36,12 @@ static void shapes_outline (pw_plot_body *shape) {
     if (i < 2 * n - 2) memcpy (hull[corners++], next, sizeof *hull);
   }
   shape->corners = corners < 3 ? 0 : corners;
-  memcpy (shape->corner, hull, (size_t)shape->corners * sizeof *hull);
+  memcpy (shape->hull, hull, (size_t)shape->corners * sizeof *hull);
+  shape->corner = (const double (*)[2])shape->hull;
 }
 
 int pw_plot_inside (const pw_plot_body *shape, int k) {
+  if (shape->corners && shape->corner != (const double (*)[2])shape->hull) return 0;
   for (int i = 0; i < shape->corners; i++)
     if (memcmp (shape->corner[i], shape->attachment[k], sizeof shape->attachment[k]) == 0) return 0;
   return 1;
@@ -182,7 +184,11 @@ void pw_plot_find_shapes (pw_plots *plots) {
   for (int b = 0; b < plots->bodies.drawn; b++) {
     const double *M = mass + 3 * plots->bodies.system_index[b];
     plots->shape[b].is_point_mass = M[0] > 0 && M[2] == 0;
-    shapes_outline (&plots->shape[b]);
+    const pw_body *body = pw_model_bodies (plots->model, &(int){ 0 }) + plots->bodies.system_index[b];
+    if (body->corners)
+      plots->shape[b].corners = body->corners, plots->shape[b].corner = body->outline;
+    else
+      shapes_outline (&plots->shape[b]);
   }
 }
 
@@ -246,6 +252,11 @@ double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i) {
       pw_plot_point (motion, plots->shape[k].attachment[n], point);
       box_extend (box, point);
     }
+    for (int n = 0; n < plots->shape[k].corners; n++) {
+      double point[2];
+      pw_plot_point (motion, plots->shape[k].corner[n], point);
+      box_extend (box, point);
+    }
   }
   for (int w = 0; w < plots->wheels.drawn; w++) box_extend (box, pw_plot_track (plots, i, &plots->wheels, w));
   box_extend_discs (box, plots, i, 0);
@@ -254,10 +265,12 @@ double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i) {
 
 void pw_plot_measure (pw_plots *plots) {
   pw_plot_box box = pw_plot_ground (plots);
-  double reach = 0, size = pw_plot_extend (&box, plots, 0); /* reach: farthest attachment point of a body */
-  for (int b = 0; b < plots->bodies.drawn; b++)
-    for (int k = 0; k < plots->shape[b].attachments; k++)
-      reach = fmax (reach, hypot (plots->shape[b].attachment[k][0], plots->shape[b].attachment[k][1]));
+  double reach = 0, size = pw_plot_extend (&box, plots, 0); /* reach: farthest point of a body */
+  for (const pw_plot_body *shape = plots->shape; shape < plots->shape + plots->bodies.drawn; shape++) {
+    for (int k = 0; k < shape->attachments; k++)
+      reach = fmax (reach, hypot (shape->attachment[k][0], shape->attachment[k][1]));
+    for (int k = 0; k < shape->corners; k++) reach = fmax (reach, hypot (shape->corner[k][0], shape->corner[k][1]));
+  }
   for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++)
     if (disc->body >= 0) reach = fmax (reach, hypot (disc->at[0], disc->at[1]) + disc->at[2]);
   plots->size = size > 0 ? size : pw_system_length (plots->system);
