@@ -226,9 +226,14 @@ $(BUILD)/models/%.c: %.c
 
 OWN_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
+# LAPACK first, where it is a library of its own: many distributions bind all of its symbols when a program starts, and each is
+# sought in the libraries in this order.
+FIRST_LIBS = $(foreach l,lapack blas,$(if $(filter /%,$(shell $(CC) -print-file-name=lib$l.so)),-l$l))
+
 $(PROGRAM): $(CLI_OBJ) $(BASE_OBJ) $(LIB) $(FILES_LIB)
 	$(call say,LINK)
-	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(BASE_OBJ) $(OWN_LIBS) $(CLI_LIBS) -lm
+	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ -Wl,--no-as-needed $(FIRST_LIBS) -Wl,--as-needed \
+	  $(CLI_OBJ) $(BASE_OBJ) $(OWN_LIBS) $(CLI_LIBS) -lm
 
 # The whole libraries, with internal functions.
 WHOLE := -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive $(FILES_LIBS) $(SOLVER_LIBS)
