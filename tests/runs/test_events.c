@@ -6,6 +6,7 @@
 #include <string.h>
 #include "check.h"
 #include "pinwheel-selftest.h"
+#include "random_vehicle.h"
 #include "runs.h"
 #include "scene.h"
 
@@ -285,82 +286,17 @@ TEST (circle_orders) {
 
 /* ---- Events are neither missed nor invented ---- */
 
-static double events_random (unsigned *state) {
-  *state = *state * 1664525u + 1013904223u;
-  return (double)(*state >> 8) / (1 << 24);
-}
-
-/* A vehicle of two segments with random masses, places, grips of both wheels, friction in the hinge, and stops
- * without restitution: how many bounces accumulate, each with new events of the wheels, depends on the tolerance. */
 static unsigned events_seed = 1;
-static int events_rolling; /* 1: the second wheel rolls, and slides on a circle; half of the limits oscillate */
-
-static pw_signal events_limit (unsigned *x, double value) {
-  if (!events_rolling || events_random (x) < 0.5) return (pw_signal){ .constant = value };
-  return (pw_signal){ PW_HARMONIC, .harmonic = { .amplitude = 0.5 * value * events_random (x),
-                                                 .omega = 5 * events_random (x),
-                                                 .offset = value } };
-}
-
-SCENE (events_vehicle) {
-  unsigned *x = &events_seed;
-  const double d = 0.1 + 0.3 * events_random (x);
-  pw_add_body (m,
-               &(pw_body){ .name = "a", .mass = 0.5 + events_random (x), .inertia = 0.05 + 0.2 * events_random (x) });
-  pw_add_body (m, &(pw_body){ .name = "b",
-                              .mass = 0.1 + 0.4 * events_random (x),
-                              .inertia = 0.01 + 0.05 * events_random (x),
-                              .start = { 0.5 + d, 0, 0 } });
-  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "a", "b" }, .at = { { 0.5 }, { -d } } });
-  pw_add_wheel (
-      m, &(pw_wheel){
-             .name = "A", .body = "a", .at = { -0.5 }, .grip = events_limit (x, 0.02 + 0.2 * events_random (x)) });
-  const double grip = 0.05 + 0.4 * events_random (x);
-  if (events_rolling)
-    pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "C",
-                                                  .body = "b",
-                                                  .at = { 0.2, 0.02 },
-                                                  .radius = 0.1,
-                                                  .inertia = 0.002 + 0.01 * events_random (x),
-                                                  .grip = events_limit (x, grip),
-                                                  .brake = events_limit (x, 0.03 * events_random (x)) });
-  else
-    pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "b", .at = { 0.2, 0.02 }, .grip = events_limit (x, grip) });
-  pw_add_friction (m, &(pw_friction){ .name = "F",
-                                      .body = { "a", "b" },
-                                      .limit = events_limit (x, 0.01 + 0.05 * events_random (x)),
-                                      .limit_sliding = { .constant = events_random (x) < 0.5 ? 0 : 0.005 } });
-  pw_add_end_stop (m, &(pw_end_stop){ .name = "S",
-                                      .body = { "a", "b" },
-                                      .what = PW_DRIVE_ANGLE,
-                                      .low = -0.2 - events_random (x),
-                                      .high = 0.2 + events_random (x) });
-  pw_add_torque (m, &(pw_torque){ .name = "T",
-                                  .body = { "a", "b" },
-                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1 + 0.2 * events_random (x),
-                                                                        .omega = 1 + 4 * events_random (x),
-                                                                        .phase = 6 * events_random (x) } } });
-}
-
-static int events_of (pw_system *s, const char *method, double step, double t, double *time, int *row) {
-  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-11, .span = t });
-  (void)runs_to (r, t);
-  int count;
-  const pw_event *event = pw_run_events (r, &count);
-  for (int i = 0; i < count && i < 400; i++) time[i] = event[i].t, row[i] = 8 * event[i].row + event[i].to;
-  pw_run_close (r);
-  return count;
-}
 
 TEST (none_missed) {
   static double time[3][400];
   static int row[3][400];
   int total = 0;
   for (int i = 0; i < 40; i++) {
-    pw_system *s = scene_system (&events_vehicle_table, NULL);
-    int fine = events_of (s, "rk4+projection", 1e-4, 3, time[0], row[0]);
-    int coarse = events_of (s, "rk4+projection", 1e-2, 3, time[1], row[1]);
-    int adaptive = events_of (s, "erk8+projection", 0, 3, time[2], row[2]);
+    pw_system *s = random_vehicle (&events_seed, 0);
+    int fine = random_vehicle_events (s, "rk4+projection", 1e-4, 3, time[0], row[0]);
+    int coarse = random_vehicle_events (s, "rk4+projection", 1e-2, 3, time[1], row[1]);
+    int adaptive = random_vehicle_events (s, "erk8+projection", 0, 3, time[2], row[2]);
     if (fine != coarse || fine != adaptive)
       print_error ("scene %d: %d events with a hundredth of the step, %d, %d\n", i, fine, coarse, adaptive);
     assert_int_equal (fine, coarse);
@@ -381,12 +317,11 @@ TEST (rolling_wheels) {
   static double time[2][400];
   static int row[2][400];
   int total = 0;
-  const unsigned seed = events_seed;
-  events_seed = 1, events_rolling = 1;
+  unsigned seed = 1;
   for (int i = 0; i < 12; i++) {
-    pw_system *s = scene_system (&events_vehicle_table, NULL);
-    const int count = events_of (s, "erk8+projection", 0, 3, time[0], row[0]);
-    assert_int_equal (events_of (s, "radau+ggl", 0, 3, time[1], row[1]), count);
+    pw_system *s = random_vehicle (&seed, 1);
+    const int count = random_vehicle_events (s, "erk8+projection", 0, 3, time[0], row[0]);
+    assert_int_equal (random_vehicle_events (s, "radau+ggl", 0, 3, time[1], row[1]), count);
     for (int k = 0; k < count; k++) {
       assert_int_equal (row[0][k], row[1][k]);
       check_close (check_text ("scene %d, event %d", i, k), time[1][k], time[0][k], 1e-6,
@@ -395,7 +330,6 @@ TEST (rolling_wheels) {
     total += count;
     pw_system_free (s);
   }
-  events_seed = seed, events_rolling = 0;
   assert_true (total > 150);
 }
 
@@ -405,7 +339,7 @@ TEST (not_located) {
   double error[2] = { 0, 0 }, balance[2] = { 0, 0 };
   for (int i = 0; i < 30; i++) {
     double q[9], v[9];
-    pw_system *s = scene_system (&events_vehicle_table, NULL);
+    pw_system *s = random_vehicle (&events_seed, 0);
     const int n = pw_system_coordinates (s);
     assert_true (n <= 9);
     runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-11, .span = 3 }, 3, q, v, NULL);
@@ -676,7 +610,7 @@ TEST (wheels_on_an_axle) {
     for (int two = 0; two < 2; two++) {
       events_axle[0] = two ? 0.5 : 0.7, events_axle[1] = two ? 0.2 : 0;
       pw_system *s = scene_system (&events_pair_table, NULL);
-      count[two] = events_of (s, method[i], 1e-3, 8, time[two], row[two]);
+      count[two] = random_vehicle_events (s, method[i], 1e-3, 8, time[two], row[two]);
       runs_state (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-11, .span = 8 }, 8, q[two], v, NULL);
       pw_system_free (s);
     }
