@@ -158,7 +158,8 @@ static int events_project (pw_run *r, pw_error *error) {
   pw_projector p;
   int status = pw_projector_open (&p, r, NULL, NULL, error);
   if (status != PW_OK) return status;
-  const double before = pw_energy (r, r->v);
+  double before = 0; /* a sample may have moved the bodies of the workspace */
+  if (r->settings.ledger && pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK) before = pw_energy (r, r->v);
   status = pw_project_positions (&p, r, r->t, r->q, r->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, r->v);
   pw_projector_close (&p);

@@ -561,6 +561,29 @@ TEST (samples_of_shortened_steps) {
   pw_system_free (s);
 }
 
+/* Energies of samples between events: what is sampled before an event does not enter what follows it. */
+TEST (energies_of_samples) {
+  static const char *const method[] = { "erk5+projection", "erk8+projection", "radau+ggl",  "bdf+projection",
+                                        "ida+ggl",         "adams+baumgarte", "galpha+ggl", "rk4+nullspace" };
+  static const char *const scene[] = { "ball", "pendulum", "rocking" };
+  pw_error error = { 0 };
+  for (int i = 0; i < 3; i++) {
+    pw_system *s = runs_scene (scene[i], "");
+    for (int m = 0; m < 8; m++) {
+      pw_run *r = runs_open (s, method[m], &(pw_settings){ .rtol = 1e-9, .step = 1e-3, .span = 2, .ledger = 1 });
+      for (int k = 1; k <= 130; k++) {
+        pw_sample x;
+        while (pw_run_time (r) < k / 65.) check_ok (pw_run_advance (r, 4, &error), &error);
+        check_ok (pw_run_sample (r, k / 65., &x, &error), &error);
+        check_close (check_text ("%s, %s, t = %g", scene[i], method[m], x.t), x.balance, 0, 1e-4,
+                     "1e5 rtol, of energies of about 10 J; the error of galpha");
+      }
+      pw_run_close (r);
+    }
+    pw_system_free (s);
+  }
+}
+
 /* The first impact of the pendulum, whatever the number of samples with which it is located: samples of steps, with
  * which modes are decided, are not those interpolated for tables. */
 TEST (all_tolerances) {
