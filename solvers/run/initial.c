@@ -888,7 +888,8 @@ char *pw_run_initial_reason (pw_run *r, int state, char *buffer, size_t size) {
     const double by = row < 0 ? 0 : fabs (Jv[row] - eta[row]);
     if (by > 0 && (is_velocity ? now.velocity : now.position) > PW_RESIDUAL_ACCEPTED)
       snprintf (buffer, size, "%s would be %s by %.3g %s%s", PW_NAME (pw_system_row_name, s, row),
-                is_velocity ? "violated" : "open", by, initial_unit (s, row), is_velocity ? "/s" : "");
+                is_velocity || pw_is_limited (s, row) ? "violated" : "open", by, initial_unit (s, row),
+                is_velocity ? "/s" : "");
   }
   *value = kept;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
