@@ -46,7 +46,7 @@ summary_figure () {
       awk -F '\t' -v g=$g -v m="$m" -v n=$n '$1 == g && $2 == m && $4 == 6 && $5 != "-" { print $5, -n }' "$work/relative" >>"$work/strip-$g"
     done
   done
-  draw bench-methods 480 'Processor time for an error of 10^{-6}, relative to the cheapest method' <<G
+  draw bench-methods 480 'Processor time for an error of 1e-6, relative to the cheapest method' <<G
 set logscale x; set format x '10^{%T}'; unset key; set grid; set xrange [0.8:*]; set yrange [-$n.5:-0.5]
 set xlabel 'processor time / that of the cheapest method'
 set ytics ($labels)
