@@ -5,10 +5,11 @@
 #include "decision.h"
 
 #define DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
+#define DECISION_NEAR 0.5        /* [limit] of a circle: a multiplier that is larger is near its limit */
 enum {
-  DECISION_MOST = 5000, /* combinations of modes that are tried, at about a microsecond each */
-  DECISION_PASSES = 10000 /* of projected gradients */,
-  DECISION_LATE = 500
+  DECISION_MOST = 5000,    /* combinations of modes that are tried, at about a microsecond each */
+  DECISION_PASSES = 10000, /* most projected gradients */
+  DECISION_LATE = 500      /* of these, after which circles no longer alternate */
 };
 
 int pw_decision_apart (const pw_decision *d, int k) {
@@ -96,15 +97,17 @@ static double decision_violation (const pw_decision *d, int k, double size, int 
   *to = d->x[k] > hi ? 1 : -1;
   if (d->limit[d->list[k]].circle) return 0; /* decision_step_on_circle */
   if (d->fixed[k] || pw_decision_apart (d, k)) return 0;
-  if (d->redundant
-          [k]) { /* it holds only if the equations on which it depends imply z = 0; otherwise it changes first */
+  /* It holds only if the equations on which it depends imply z = 0.  Otherwise it changes before all others: until then
+   * their multipliers are those of contradictory equations. */
+  if (d->redundant[k]) {
     const double z = pw_decision_z (d, k) / unit;
     *to = isinf (lo) || (!isinf (hi) && z > 0) ? 1 : -1;
     return 1e6 * (*to * z - 1e-9 * size);
   }
   if (d->trial[k] == 0) return unit * fmax (d->x[k] - hi, lo - d->x[k]);
   *to = 0;
-  return -d->trial[k] * pw_decision_z (d, k) / unit - 2 * DECISION_DEPENDENT * size; /* z of nearly dependent ones */
+  /* nearly dependent equations have z of this size whichever of them hold */
+  return -d->trial[k] * pw_decision_z (d, k) / unit - 2 * DECISION_DEPENDENT * size;
 }
 
 /* Sets the given multipliers, except those of friction, which pw_decision_solve sets. */
@@ -150,8 +153,8 @@ int pw_decision_pivot (pw_decision *d, int skips) {
 }
 
 /* A projected-gradient step for the circle of the equations k, k + 1: y = x + z / trace (A), of their diagonal block.
- * If y is within the limit, and `late` is 0, both hold from now on.  Otherwise x has the direction of y and the length
- * of the limit.  Returns the change of the direction, or 2 if the mode changes. */
+ * If y is within the limit, both hold from now on, unless it is `late` and y is near the limit.  Otherwise x has the
+ * direction of y and the length of the limit.  Returns the change of the direction, or 2 if the mode changes. */
 static double decision_step_on_circle (pw_decision *d, int k, int late) {
   double y[2], change = 0;
   for (int m = 0; m < 2; m++) {
@@ -162,7 +165,7 @@ static double decision_step_on_circle (pw_decision *d, int k, int late) {
   }
   const double size = hypot (y[0], y[1]), most = d->hi[k] * (1 + (d->trial[k] ? -1 : 1) * 1e-13);
   if (size <= most && (d->trial[k] == 0 || size == 0)) return 0;
-  if (size < most && !(late && size > 0.5 * most)) return d->trial[k] = d->trial[k + 1] = 0, 2;
+  if (size < most && !(late && size > DECISION_NEAR * most)) return d->trial[k] = d->trial[k + 1] = 0, 2;
   if (d->trial[k] == 0) change = 2;
   for (int m = 0; m < 2; m++) {
     change = fmax (change, fabs (y[m] / size - d->towards[k + m]));
@@ -220,7 +223,7 @@ static int decision_enumerate (pw_decision *d, int found, int *count) {
   return *count == 1 ? pw_decision_solve (d, 1) : PW_RETRY;
 }
 
-/* 1 if circles at their limits slide along their multipliers, or do not slide. */
+/* 1 if no circle at its limit would slide against the direction of its multiplier. */
 static int decision_circles_agree (const pw_decision *d) {
   const double size = decision_size (d);
   for (int k = 0; k < d->n; k++) {
@@ -231,8 +234,8 @@ static int decision_circles_agree (const pw_decision *d) {
   return 1;
 }
 
-/* The first pass: from the present modes on, as friction requires; otherwise from all that hold on, so that multipliers
- * are not larger than others that depend on them require. */
+/* The first pass.  With friction of contacts it begins with the present modes.  Otherwise all hold at first, so that of
+ * equations that depend on each other no more than necessary reach their limits. */
 static int decision_begin (pw_decision *d, int coupled, int *count) {
   int status = coupled ? pw_decision_pivot (d, 0) : PW_RETRY;
   for (int k = 0; k < d->n && status != PW_OK; k++)
@@ -242,8 +245,8 @@ static int decision_begin (pw_decision *d, int coupled, int *count) {
 }
 
 /* Projected gradients for circles (Goldstein 1964, Convex programming in Hilbert space) alternate with pivoting for the
- * other equations.  Where equations depend on each other, which circles are at their limits may alternate, too: late
- * ones that are near it then stay there. */
+ * other equations.  If equations depend on each other, circles may leave and reach their limits in turn without end:
+ * after DECISION_LATE passes they stay there, and the result is checked. */
 int pw_decide (pw_decision *d, int *count) {
   int coupled = 0, circles = 0;
   for (int k = 0; k < d->n; k++) coupled |= d->normal[k] >= 0, circles |= d->limit[d->list[k]].circle;

@@ -403,17 +403,17 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     const int on = x->partner[i];
     const double speed = equations == 2 ? hypot (x->u[i], x->u[i + 1]) : fabs (x->u[i]), u = speed / x->unit[i];
     const int open = !x->rests[i] && modes_open (r, i, g[i]);
-    const int parts = pw_mode_depends (x, i) || (equations == 2 && x->spare[i + 1]);
+    const int moving = u > PW_MODES_SMALL;
+    const int parts = moving && (pw_mode_depends (x, i) || (equations == 2 && x->spare[i + 1]));
     const int misses = equations == 2 && x->triggered[i] && x->mode[i] && speed > x->reach[i]; /* u passes beside 0 */
     if (on >= 0 && x->place[on] < 0) {
       x->mode[i] = 1, x->spare[i] = x->still[i] = 0;
       continue;
     }
     const int moves = (jumps || (on >= 0 && x->before[on])) && !open;
-    if ((moves || misses || parts) && u > PW_MODES_SMALL) pw_mode_slide (x, i, x->u);
-    const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps && !misses &&
-                      !(parts && u > PW_MODES_SMALL);
-    const int slides = x->mode[i] && !rolls && u > PW_MODES_SMALL;
+    if ((moving && (moves || misses)) || parts) pw_mode_slide (x, i, x->u);
+    const int stops = x->triggered[i] && !jumps && !misses && !parts; /* u has reached 0 */
+    const int slides = x->mode[i] && moving && (!stops || x->row[i] < r->s->holonomic);
     for (int k = i; k < i + equations && slides; k++) x->spare[k] = x->still[k] = 0;
     if (open || (slides && on < 0)) continue;
     const double unit = on < 0 ? x->force_unit[i] : x->limit[i].most;

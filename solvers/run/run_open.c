@@ -115,21 +115,17 @@ static int run_check_stop (pw_run *r, int status) {
   return status >= PW_OK && pw_run_stop_opening (r) ? PW_STOPPED : status;
 }
 
-/* Leaves out equations with limits that depend on others. */
+/* Leaves out equations with limits that depend on others, and opens the saddle of those that are left. */
 static int run_leave_out (pw_run *r, pw_error *error) {
   pw_error own = { 0 };
   int status = pw_events_spare (r, &own);
   if (status == PW_OK) status = run_check_stop (r, pw_run_open_saddle (r, &own));
-  if (status == PW_OK && pw_watchdog_sine (r, NULL) < r->thresholds.rank_suspect) status = PW_RETRY;
   if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-  if (status != PW_OK)
-    return pw_fail (error, PW_INPUT,
-                    "model %s: limits of reactions, as by a grip, with constraints without limits that depend on each "
-                    "other: leave out redundant ones",
-                    r->s->model);
-  status = pw_run_evaluate (r, error);
-  if (status == PW_OK) pw_run_set_references (r);
-  return status;
+  if (status == PW_OK && pw_watchdog_sine (r, NULL) >= r->thresholds.rank_suspect) return PW_OK;
+  return pw_fail (error, PW_INPUT,
+                  "model %s: limits of reactions, as by a grip, with constraints without limits that depend on each "
+                  "other: leave out redundant ones",
+                  r->s->model);
 }
 
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
@@ -141,8 +137,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
   if (sine < (large ? r->thresholds.rank_refused : r->thresholds.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
-    if (r->events) return run_leave_out (r, error);
-    status = run_check_stop (r, pw_rank_open (r, error));
+    status = r->events ? run_leave_out (r, error) : run_check_stop (r, pw_rank_open (r, error));
     if (status == PW_OK && r->redundant) status = run_check_stop (r, pw_run_open_saddle (r, error));
     if (status != PW_OK) return status;
   }

@@ -639,9 +639,9 @@ TEST (wheels_on_an_axle) {
     }
     assert_true (count[0] >= 6);
     assert_int_equal (count[1], 2 * count[0]);
-    const double rtol = 1e-7;
-    for (int k = 0; k < count[1]; k++) check_close (method[i], time[1][k], time[0][k / 2], rtol, "multistep methods");
-    for (int j = 0; j < 3; j++) check_close (method[i], q[1][j], q[0][j], 10 * rtol, "the same");
+    const char *reason = "errors of multistep methods at rtol 1e-11, which take other steps";
+    for (int k = 0; k < count[1]; k++) check_close (method[i], time[1][k], time[0][k / 2], 1e-7, reason);
+    for (int j = 0; j < 3; j++) check_close (method[i], q[1][j], q[0][j], 1e-6, reason);
   }
 }
 
