@@ -24,6 +24,9 @@ typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED, PW_GAPLESS } pw_gaps;
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, unsigned char *missing, int *rows, pw_error *error);
 
+/* The length of the number at p: digits, perhaps with a point and an exponent; 0 if there is none (parser.c). */
+size_t pw_number_size (const char *p);
+
 /* ---- Outlines of bodies in drawings (svg.c) ---- */
 
 /* Points; zero-initialised, none.  Free `point`. */

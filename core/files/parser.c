@@ -34,8 +34,7 @@ static size_t name_size (const char *p) {
   return n;
 }
 
-/* The length of the number at p: digits, perhaps with a decimal point and an exponent; 0 if there is none. */
-static size_t number_size (const char *p) {
+size_t pw_number_size (const char *p) {
   if (!is_digit (*p) && *p != '.') return 0;
   size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
   if (whole + decimals == 0) return 0;
@@ -47,7 +46,7 @@ static size_t number_size (const char *p) {
 }
 
 char *pw_number_hint (const char *text, char *buffer, size_t size) {
-  const size_t sign = *text == '+' || *text == '-', n = sign + number_size (text + sign);
+  const size_t sign = *text == '+' || *text == '-', n = sign + pw_number_size (text + sign);
   const char *unit = text + n + strspn (text + n, " "), *factor = strcmp (unit, "pi") == 0 ? unit : NULL;
   char number[32];
   double value;
@@ -69,7 +68,7 @@ static int is_call (const char *after) {
 }
 
 int pw_expression_number (const char *text, double *value) {
-  size_t sign = *text == '+' || *text == '-', n = number_size (text + sign);
+  size_t sign = *text == '+' || *text == '-', n = pw_number_size (text + sign);
   return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
 }
 
@@ -85,7 +84,7 @@ int pw_expression_is_name (const char *text) {
 const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_NAME]) {
   while (**rest) {
     const char *p = *rest;
-    size_t n = name_size (p), number = n ? 0 : number_size (p);
+    size_t n = name_size (p), number = n ? 0 : pw_number_size (p);
     *rest += n ? n : number ? number : 1;
     if (n == 0) continue;
     snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
@@ -206,7 +205,7 @@ static void parser_next (parser *p) {
   word += strspn (word, " \t\r\n");
   p->at = (size_t)(word - p->text);
   p->symbol = NULL;
-  size_t name = name_size (word), number = number_size (word);
+  size_t name = name_size (word), number = pw_number_size (word);
   p->size = name ? name : number ? number : *word != 0;
   p->type = name ? 'n' : number ? '0' : *word;
   if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
@@ -302,7 +301,7 @@ static parser_part parser_no_operator (parser *p) {
   char hint[PW_HINT] = "";
   const char *number = p->text + p->previous,
              *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
-  if (p->type == 'n' && number_size (number) && parser_knows (p, name))
+  if (p->type == 'n' && pw_number_size (number) && parser_knows (p, name))
     pw_print (hint, sizeof hint, "; write %.*s*%s", (int)(p->previous_end - p->previous), number, name);
   else if (p->type == 'n' && *pw_number_hint (number, hint, sizeof hint) == 0) /* "10 km/h", else "30deg*a" */
     pw_number_hint (PW_PRINTED (200, "%.*s", (int)(p->at + p->size - p->previous), number), hint, sizeof hint);

@@ -17,15 +17,17 @@ typedef struct {
 static int svg_number (svg *s, double *value) {
   char text[60];
   s->at += strspn (s->at, " \t\r\n,");
-  const char *c = s->at + (*s->at == '-' || *s->at == '+');
-  c += strspn (c, "0123456789");
-  if (*c == '.') c += 1 + strspn (c + 1, "0123456789");
-  if ((*c == 'e' || *c == 'E') && strspn (c + 1 + (c[1] == '-' || c[1] == '+'), "0123456789"))
-    c += 1 + (c[1] == '-' || c[1] == '+'), c += strspn (c, "0123456789");
-  if (c == s->at || c - s->at >= (long)sizeof text) return 0;
-  pw_print (text, sizeof text, "%.*s", (int)(c - s->at), s->at);
-  s->at = c;
+  const size_t sign = *s->at == '-' || *s->at == '+', n = pw_number_size (s->at + sign);
+  if (n == 0 || sign + n >= sizeof text) return 0;
+  pw_print (text, sizeof text, "%.*s", (int)(sign + n), s->at);
+  s->at += sign + n;
   return pw_read_number (text, value) == PW_OK;
+}
+
+/* Skips blanks and commas; 1 if the attribute ends there. */
+static int svg_ends (svg *s) {
+  s->at += strspn (s->at, " \t\r\n,");
+  return *s->at == '"' || *s->at == '\'';
 }
 
 /* Reads a point, from the last one if it is relative. */
@@ -83,11 +85,9 @@ static const char *svg_path (svg *s, int *status) {
   char command = 0, last = 0;
   int relative = 0;
   for (int first = 1; *status == PW_OK; first = 0) {
-    s->at += strspn (s->at, " \t\r\n,");
-    if (isalpha ((unsigned char)*s->at)) {
+    if (svg_ends (s)) return first ? "its path is empty" : "";
+    if (isalpha ((unsigned char)*s->at))
       relative = islower ((unsigned char)*s->at), command = (char)toupper ((unsigned char)*s->at++);
-    } else if (!strchr ("0123456789+-.", *s->at) || *s->at == 0)
-      return first ? "its path is empty" : "";
     if ((command == 'M' && !first) || command == 'Z') return "";
     if (first && command != 'M') return "its path does not begin with M";
     double point[2] = { s->now[0], s->now[1] };
@@ -119,6 +119,12 @@ static const char *svg_attribute (const char *tag, const char *name) {
   return NULL;
 }
 
+/* Whether a transformation, after its quote, is a translation alone. */
+static int svg_translates (const char *text) {
+  const size_t n = strcspn (text, ")");
+  return strncmp (text, "translate", 9) == 0 && text[n] == ')' && text[n + 1] == text[-1];
+}
+
 const char *pw_svg_outline (const char *text, pw_corners *points, int *status) {
   svg s = { .points = points };
   *status = PW_OK;
@@ -127,14 +133,15 @@ const char *pw_svg_outline (const char *text, pw_corners *points, int *status) {
     if (end && strstr (tag, end)) tag = strstr (tag, end);
     if (end) continue;
     const char *transform = svg_attribute (tag, "transform"), *polygon;
-    if (transform && strncmp (transform, "translate", 9) != 0)
+    if (transform && !svg_translates (transform))
       return "it has transformations: apply them in the program that has drawn it";
     if (strncmp (tag, "<path", 5) == 0 && (s.at = svg_attribute (tag, "d")) != NULL) return svg_path (&s, status);
     if ((strncmp (tag, "<polygon", 8) != 0 && strncmp (tag, "<polyline", 9) != 0) ||
         (polygon = svg_attribute (tag, "points")) == NULL)
       continue;
     double point[2];
-    for (s.at = polygon; *status == PW_OK && svg_point (&s, 0, point);) *status = svg_add (&s, point);
+    for (s.at = polygon; *status == PW_OK && !svg_ends (&s); *status = svg_add (&s, point))
+      if (!svg_point (&s, 0, point)) return "a number of its points is missing";
     return "";
   }
   return "it has no path, polygon or polyline: convert its objects to paths";

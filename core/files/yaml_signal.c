@@ -682,8 +682,9 @@ static int outline_svg (pw_reader *r, const pw_node *node, pairs *p) {
   return status == PW_OK && p->x && p->y ? PW_OK : read_no_memory (r);
 }
 
-/* Scales the corners about the middle of their box, so that it has this width, and moves the middle to the origin. */
-static void outline_scale (pairs *p, double width) {
+/* Scales the corners about the middle of their box, so that it has this width, and moves the middle to the origin; 0 if
+ * the box has no width. */
+static int outline_scale (pairs *p, double width) {
   double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
   for (int i = 0; i < p->count; i++) {
     low[0] = fmin (low[0], p->x[i]), high[0] = fmax (high[0], p->x[i]);
@@ -693,6 +694,7 @@ static void outline_scale (pairs *p, double width) {
     p->x[i] = (p->x[i] - (low[0] + high[0]) / 2) * width / (high[0] - low[0]);
     p->y[i] = (p->y[i] - (low[1] + high[1]) / 2) * width / (high[0] - low[0]);
   }
+  return high[0] > low[0];
 }
 
 int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body) {
@@ -717,7 +719,9 @@ int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body) {
   else
     pairs_file (r, v[1], (const char *const[2]){ NULL }, (const char *const[2]){ "m", "m" }, PW_GAPLESS, &p);
   if (pairs_count (r, node, &p, 1) != PW_OK) return r->error->status;
-  if (width > 0) outline_scale (&p, width);
+  if (p.count < 3) return read_fail (r, node->at, "%s: expected 3 corners at least, found %d", r->label, p.count);
+  if (width > 0 && !outline_scale (&p, width))
+    return read_fail (r, v[2]->at, "%s: a width is given, but all corners have the same x", r->label);
   double (*corner)[2] = pw_arena_alloc (r->arena, ((size_t)p.count + 1) * sizeof *corner);
   if (corner == NULL) return read_no_memory (r);
   for (int i = 0; i < p.count; i++) corner[i][0] = p.x[i] + at[0], corner[i][1] = p.y[i] + at[1];

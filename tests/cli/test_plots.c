@@ -252,7 +252,12 @@ TEST (own_outlines) {
     { "o.svg", "<svg><path d='M0 0L1'/></svg>", "o.svg: a number of its path is missing" },
     { "o.svg", "<svg><rect width='1'/></svg>", "o.svg: it has no path, polygon or polyline" },
     { "o.svg", "<svg><g transform='rotate(9)'><path d='M0 0L1 1'/></g></svg>", "o.svg: it has transformations" },
-    { "o.svg", "<svg><path d='M0 0L1 1'/></svg>", "body a: its outline has 2 corners: expected 3 to 2000" },
+    { "o.svg", "<svg><g transform='translate(9) scale(2)'><path d='M0 0L1 1'/></g></svg>", "it has transformations" },
+    { "o.svg", "<svg><path d='M0 0L1 1 2 0;3 0'/></svg>", "o.svg: a number of its path is missing" },
+    { "o.svg", "<svg><polygon points='0,0 2,0 2,1-1'/></svg>", "o.svg: a number of its points is missing" },
+    { "o.svg", "<svg><path d='M0 0L1 1'/></svg>", "outline of body a: expected 3 corners at least, found 2" },
+    { "[]", "", "outline of body a: expected 3 corners at least, found 0" },
+    { "{points: [[0, 0], [0, 1], [0, 2]], width: 1}", "", "all corners have the same x" },
     { "none.svg", "", "outline of body a: cannot read \"none.svg\": No such file" },
     { "{width: 1}", "", "outline of body a: expected points or a file, .svg or .csv" },
   };
