@@ -82,7 +82,7 @@ static void command_help (const pw_command *command) {
 
 /* ---- Reading ---- */
 
-/* Writes the commands that have an option of this name, " (sweep and drift have it)"; "" if none has. */
+/* Writes the commands that have an option of this name, " (an option of sweep, drift)"; "" if none has. */
 static const char *command_others (const pw_command *const *all, const char *name, char text[PW_HINT]) {
   int used = 0;
   *text = 0;

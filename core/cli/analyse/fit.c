@@ -201,7 +201,7 @@ static void data_report (const pw_fit *fit) {
                 PW_COUNTED (empty, "empty cell"), PW_COUNTED (fit->untimed, "row"), PW_COUNTED (fit->late, "row"));
 }
 
-/* Converts times, those of events too, to seconds.  `event`: columns of the table with these, or their deviations. */
+/* Converts times to seconds.  time: 1 for a column with times, of rows or events, or with their deviations. */
 static int data_convert_times (pw_fit *fit, double *table, const unsigned char *time, int columns, pw_error *error) {
   double scale = 1, offset = 0;
   if (pw_cli_number ("--time-scale", fit->time_scale_text, PW_POSITIVE, &scale, error) != PW_OK ||
@@ -214,10 +214,12 @@ static int data_convert_times (pw_fit *fit, double *table, const unsigned char *
   return PW_OK;
 }
 
-/* Whether column j of the table, or of its row i a datum, is along the run. */
+/* Whether column j of the table has data along the run. */
 static int data_is_along (const pw_fit *fit, int j) {
   return j > 0 && j <= fit->columns && fit->column_kind[j - 1] == FIT_ALONG;
 }
+
+/* Whether row i of the table has a datum along the run. */
 static int data_row_is_along (const pw_fit *fit, const double *table, int i) {
   int found = 0;
   for (int j = 1; j <= fit->columns; j++) found |= data_is_along (fit, j) && !isnan (table[j * fit->rows + i]);

@@ -32,7 +32,7 @@ span::first-letter { text-transform: uppercase; }
 <p>Each page simulates a vehicle or a linkage in the browser: move a slider and see the motion, its error and its cost change.</p>
 <ul>
 END
-  find "$models" -name '*.[cy]*' | sed 's,.*/\(.*\)\..*,\1 &,' | LC_ALL=C sort | while read -r name path; do
+  find "$models" -name '*.c' -o -name '*.yaml' | sed 's,.*/\(.*\)\..*,\1 &,' | LC_ALL=C sort | while read -r name path; do
     "$program" page "$path" -o "$site/$name.html" >&2
     about=$("$program" show "$path" | head -n 1 | escape)
     picture=$figures/gallery-$name.png

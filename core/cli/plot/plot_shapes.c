@@ -63,10 +63,16 @@ static void shapes_add_points (pw_plots *plots, const pw_element *e, const int *
   }
 }
 
-/* The value of a number or a choice of an element, 1 for a path; 0 if it has no such field. */
-static double shapes_field (const pw_kind *kind, const void *definition, const char *name, size_t length) {
+/* The field of an element type whose name has `length` characters, or the end of the fields, without a name. */
+static const pw_field *shapes_find (const pw_kind *kind, const char *name, size_t length) {
   const pw_field *f = kind->fields;
   while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
+  return f;
+}
+
+/* The value of a number or a choice of an element, 1 for a path; 0 if it has no such field. */
+static double shapes_field (const pw_kind *kind, const void *definition, const char *name, size_t length) {
+  const pw_field *f = shapes_find (kind, name, length);
   if (f->name == NULL) return 0;
   const void *at = (const char *)definition + f->offset;
   if (f->type == PW_TRACK) return *(pw_path *const *)at != NULL;
@@ -306,8 +312,7 @@ double pw_plot_heading (const pw_plot_link *link) {
 
 /* 1 if a field of an element is not zero, or is an optional number that is given. */
 static int symbol_has (const pw_plot_link *link, const char *name, size_t length) {
-  const pw_field *f = link->kind->fields;
-  while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
+  const pw_field *f = shapes_find (link->kind, name, length);
   return symbol_field (link, name, length) != 0 ||
          (f->name && f->given && *(const int *)((const char *)link->definition + f->given) != 0);
 }
