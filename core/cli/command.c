@@ -369,7 +369,7 @@ static int cli_check_method (const pw_cli_line *line, int i, const char *path, p
                     path, name ? name : "", name && strcmp (name, "all") == 0 ? ", but not all, which means each" : "");
   if (pw_method_parse (name, line->methods, &found, NULL, error) != PW_OK) return error->status;
   if (found == line->methods[i]) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--method-file %s: there is a method %s already; call this one otherwise", path,
+  return pw_fail (error, PW_INPUT, "--method-file %s: there is a method %s already; give this one another name", path,
                   name);
 }
 

@@ -292,7 +292,7 @@ TEST (bad_methods) {
   static const struct {
     const char *change, *message;
   } bad[] = {
-    { "s/\"kutta3\"/\"rk4\"/", "--method-file @/m.c: there is a method rk4 already; call this one otherwise\n" },
+    { "s/\"kutta3\"/\"rk4\"/", "--method-file @/m.c: there is a method rk4 already; give this one another name\n" },
     { "s/\"kutta3\"/\"a+b\"/", "m.c: a method is called \"a+b\": expected letters, digits, _ and -\n" },
     { "s/\"kutta3\"/\"all\"/", "m.c: a method is called \"all\": expected letters, digits, _ and -, but not all" },
     { "s/.open = kutta3_open,//", "integrator kutta3: its table needs open, advance, at, restart and close\n" },

@@ -537,10 +537,10 @@ static void conclusion_print (const pw_compare *compare) {
 /* ---- The rows ---- */
 
 enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
-#define COMPARE_FEW 3          /* timed runs of a row, unless --repeats is less or they exceed the limit, */
-#define COMPARE_FEWEST 2       /* and those whose times agree and sum up to COMPARE_ENOUGH */
+#define COMPARE_FEW 3          /* timed runs of a row that suffice if their times agree or are long */
+#define COMPARE_FEWEST 2       /* those that suffice if their times agree and are long */
 #define COMPARE_QUIET 0.05     /* largest spread of times that agree, over the least one */
-#define COMPARE_ENOUGH 0.1     /* total processor time [s] of a row after which no further run is timed */
+#define COMPARE_ENOUGH 0.1     /* sum of times [s] that are long */
 #define COMPARE_HOPELESS 100   /* cost of a run over that of the reference, from which on it is abandoned */
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
