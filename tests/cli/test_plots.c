@@ -424,18 +424,13 @@ static int plots_circle (const char *data, double x0, double y0, double radius, 
 
 /* Discs of contacts on a body and on the ground, each once; a line with hatching on its right; the walls of a stop. */
 TEST (contacts) {
-  const char *contacts = "  - {contact: S, body: [a, ground], at: [[0, 0], [0, -0.3]], radius: 0.3, mu: 0.5}\n"
-                         "  - {contact: D, body: [a, ground], at: [[0, 0], [3, 0]], radius: 0.3, other_radius: 0.7}\n"
-                         "  - {contact: P, body: [c, b], at: [[0, 0], [0, -2]]}\n"
-                         "  - {stop: X, body: [c, ground], what: x, low: 0, high: 9}\n";
-  const char *data = plots_symbols (contacts);
+  const char *data =
+      plots_symbols ("  - {contact: S, body: [a, ground], at: [[0, 0], [0, -0.3]], radius: 0.3, mu: 0.5}\n"
+                     "  - {contact: D, body: [a, ground], at: [[0, 0], [3, 0]], radius: 0.3, other_radius: 0.7}\n"
+                     "  - {contact: P, body: [c, b], at: [[0, 0], [0, -2]]}\n"
+                     "  - {stop: X, body: [c, ground], what: x, low: 0, high: 9}\n");
   int below = 0, walls = 0;
-  assert_int_equal (plots_circle (strstr (cli_file ("symbols/mechanism.dat"), "# bodies, at the end"), 0, 0, 0.3, 1),
-                    97);
-  assert_int_equal (plots_circle (strstr (cli_file ("symbols/mechanism.dat"), "# bodies, at the end"), 3, 0, 0.7, 0),
-                    97);
-  data = plots_symbols (contacts);
-  for (; (data = strchr (data, '\n')) != NULL;) {
+  while ((data = strchr (data, '\n')) != NULL) {
     double x[2], y[2];
     if (*++data == '\n' || sscanf (data, "%lf %lf 1 0\n%lf %lf 1 0\n", &x[0], &y[0], &x[1], &y[1]) != 4) continue;
     if (fabs (y[0] + 0.3) < 1e-9) below += y[1] < y[0] && x[1] < x[0];
@@ -443,6 +438,9 @@ TEST (contacts) {
   }
   assert_in_range (below, 5, 60);
   assert_int_equal (walls, 2);
+  data = strstr (cli_file ("symbols/mechanism.dat"), "# bodies, at the end");
+  assert_int_equal (plots_circle (data, 0, 0, 0.3, 1), 97);
+  assert_int_equal (plots_circle (data, 3, 0, 0.7, 0), 97);
 }
 
 TEST (style) {

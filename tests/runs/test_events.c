@@ -289,8 +289,8 @@ TEST (circle_orders) {
 static unsigned events_seed = 1;
 
 TEST (none_missed) {
-  static double time[3][400];
-  static int row[3][400];
+  static double time[3][RANDOM_EVENTS];
+  static int row[3][RANDOM_EVENTS];
   int total = 0;
   for (int i = 0; i < 40; i++) {
     pw_system *s = random_vehicle (&events_seed, 0);
@@ -314,8 +314,8 @@ TEST (none_missed) {
 /* The same with a rolling wheel, whose slip turns: two methods with different errors find the same events.  With fixed
  * steps those nearer to each other than the zone in which the direction of sliding is smoothed are not compared. */
 TEST (rolling_wheels) {
-  static double time[2][400];
-  static int row[2][400];
+  static double time[2][RANDOM_EVENTS];
+  static int row[2][RANDOM_EVENTS];
   int total = 0;
   unsigned seed = 1;
   for (int i = 0; i < 12; i++) {
@@ -625,8 +625,8 @@ SCENE (events_pair) {
 /* Two wheels on an axle hold and slide together, as one with the sum of their grips. */
 TEST (wheels_on_an_axle) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "radau+ggl", "bdf+baumgarte", "ida+ggl" };
-  static double time[2][400];
-  static int row[2][400];
+  static double time[2][RANDOM_EVENTS];
+  static int row[2][RANDOM_EVENTS];
   for (int i = 0; i < 5; i++) {
     double q[2][3], v[3];
     int count[2];
