@@ -688,6 +688,46 @@ static int order_pass (const order_search *x, int most, int *below) {
   return count <= most ? PW_OK : PW_RETRY;
 }
 
+/* ---- Chains ---- */
+
+/* Appends the body of link, after that of last, if it continues the chain at the same strides; returns whether it
+ * does. */
+static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *link) {
+  int J_stride = (int)(link->J_first - last->J_first), j_stride = link->j - last->j;
+  if (link->J_second - last->J_second != J_stride || link->unknown_stride != chain->unknown_stride) return 0;
+  if (chain->bodies > 1 && (J_stride != chain->J_stride || j_stride != chain->j_stride)) return 0;
+  chain->J_stride = J_stride;
+  chain->j_stride = j_stride;
+  chain->bodies++;
+  return 1;
+}
+
+int pw_block_join_chains (pw_block_ldl *l, pw_chain_between *between, pw_chain *chain, unsigned char *is_linked) {
+  int chains = 0, factors = 0;
+  /* fill-in: by columns eliminated earlier that have both a column and the next one below them */
+  for (int p = 0; p < l->nodes; p++)
+    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
+      if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
+  for (int p = 0; p < l->nodes;) {
+    const pw_chain_between *b = &between[p++];
+    if (b->sources != 1 || b->link.bodies == 0) continue;
+    pw_chain *to = &chain[chains++];
+    *to = b->link;
+    to->first_factor = factors;
+    is_linked[b->link.j / 3] = 1;
+    for (; p < l->nodes && between[p].sources == 1 && between[p].contributions == 2; p++) {
+      if (between[p].link.bodies == 0) break;
+      if (!chain_add (to, &between[p - 1].link, &between[p].link)) break;
+      is_linked[between[p].link.j / 3] = 1;
+      l->column[p].in_chain = 1;
+    }
+    const pw_block_column *last = &l->column[to->first_column + to->bodies];
+    to->includes_last = to->bodies > 1 && last[1].first_below == last->first_below;
+    factors += 3 * (to->bodies + 1);
+  }
+  return chains;
+}
+
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
   free (l->cursor);

@@ -79,6 +79,13 @@ typedef struct {
   int includes_last; /* 1: the last pin is eliminated with the chain; 0: it only receives the update by the others */
 } pw_chain;
 
+/* A column, and the block between it and the next one. */
+typedef struct {
+  int contributions; /* to the column; 2 inside a chain */
+  int sources;       /* bodies and eliminated columns that add to the block */
+  pw_chain link;     /* one of these bodies as a chain of one; link.bodies is 0 if none can be in a chain */
+} pw_chain_between;
+
 typedef struct pw_block_ldl {
   int nodes;
   pw_block_column *column; /* nodes + 1: the last one ends the ranges */
@@ -118,7 +125,11 @@ typedef struct {
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l); /* l may be NULL */
 
-/* Lays out the values, after `in_chain` has been set.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31 values
+/* Joins the bodies of all links to chains: fills `chain` (at most one for each node), sets is_linked[b] = 1 for a body b
+ * in a chain, and marks inner columns.  Adds fill-in to the sources.  Returns the number of chains. */
+int pw_block_join_chains (pw_block_ldl *l, pw_chain_between *between, pw_chain *chain, unsigned char *is_linked);
+
+/* Lays out the values, after the chains have been joined.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31 values
  * or more. */
 int pw_block_lay_out (pw_block_ldl *l);
 

@@ -206,6 +206,46 @@ DENSE_RUN (6)
 DENSE_RUN (8)
 DENSE_RUN (10)
 
+/* ---- Opening ---- */
+
+pw_dense *pw_dense_new (int groups, int known, int coords, const double *inverse_weight) {
+  pw_dense *d = calloc (1, sizeof *d + (size_t)groups * sizeof *d->group);
+  if (d == NULL) return NULL;
+  d->inverse_weight = inverse_weight;
+  d->known = calloc ((size_t)known + 1, sizeof *d->known);
+  d->zero = calloc (2 * (size_t)coords, sizeof *d->zero);
+  if (d->known == NULL || d->zero == NULL) return pw_dense_close (d), NULL;
+  d->scratch = d->zero + coords;
+  return d;
+}
+
+void pw_dense_pad (pw_dense *d) {
+  if (d->n <= 2 || d->n % 2 == 0) return;
+  d->unknown[d->n++] = d->unknown[0];
+  d->S[d->n * d->n - 1] = 1;
+}
+
+void pw_dense_add_group (pw_dense *d, int j, int width) {
+  pw_dense_group *p = &d->group[d->groups++];
+  p->j = j, p->width = width;
+}
+
+void pw_dense_add_rows (pw_dense *d, int is_pin, int first, int size, const double *J, int stride) {
+  pw_dense_group *p = &d->group[d->groups - 1];
+  p->pins += is_pin;
+  for (int i = 0; i < size; i++, J += stride) {
+    const int row = first + i, r = p->rows++;
+    unsigned char *at = p->at + r * (r + 1) / 2;
+    p->J[r] = J;
+    p->row[r] = (unsigned char)row;
+    for (int q = 0; q <= r; q++) {
+      const int with = p->row[q];
+      at[q] = (unsigned char)(row > with ? row * d->n + with : with * d->n + row);
+      if (is_pin && (q & 1) == i) d->S[at[q]] += p->J[q][i] * J[i] * d->inverse_weight[p->j + i];
+    }
+  }
+}
+
 void pw_dense_open (pw_dense *d) {
   static void (*const run[]) (pw_dense *, int, const double *, double *,
                               double *) = { [0] = dense_run_0, [1] = dense_run_1, [2] = dense_run_2,  [4] = dense_run_4,

@@ -44,6 +44,14 @@ typedef struct pw_dense {
   pw_dense_group group[];
 } pw_dense;
 
+/* Room for these numbers of groups and of known rows of all groups; NULL: out of memory.  Next come the unknowns, a row
+ * more if their number is odd, the groups with their rows, those of pins first, and the known rows. */
+pw_dense *pw_dense_new (int groups, int known, int coords, const double *inverse_weight);
+void pw_dense_pad (pw_dense *d);
+void pw_dense_add_group (pw_dense *d, int j, int width);
+/* Adds rows `first` to first + size - 1 of S, or of a pin both, to the last group; J: entries of the first in the
+ * group's columns; stride: from row to row of J. */
+void pw_dense_add_rows (pw_dense *d, int is_pin, int first, int size, const double *J, int stride);
 void pw_dense_open (pw_dense *d);  /* selects the functions for the rows and groups described */
 void pw_dense_close (pw_dense *d); /* d may be NULL */
 

@@ -933,13 +933,6 @@ static int condense_fill (const saddle_plan *plan, pw_block_ldl *l) {
 
 /* ---- Chains ---- */
 
-/* A column, and the block between it and the next one. */
-typedef struct {
-  int contributions; /* to the column; 2 inside a chain */
-  int sources;       /* bodies and eliminated columns that add to the block */
-  pw_chain link;     /* one of these bodies as a chain of one; link.bodies is 0 if none can be in a chain */
-} chain_between;
-
 /* Fills link for a body whose two nodes are a column and the next one, the only row below it.  Returns the column; -1
  * if the body cannot be in a chain. */
 static int chain_link (const saddle_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
@@ -962,44 +955,11 @@ static int chain_link (const saddle_plan *plan, const pw_block_ldl *l, int body,
   return column;
 }
 
-/* Appends the body of link, after that of last, if it continues the chain at the same strides; returns whether it
- * does. */
-static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *link) {
-  int J_stride = (int)(link->J_first - last->J_first), j_stride = link->j - last->j;
-  if (link->J_second - last->J_second != J_stride || link->unknown_stride != chain->unknown_stride) return 0;
-  if (chain->bodies > 1 && (J_stride != chain->J_stride || j_stride != chain->j_stride)) return 0;
-  chain->J_stride = J_stride;
-  chain->j_stride = j_stride;
-  chain->bodies++;
-  return 1;
-}
-
-/* Joins links to chains. */
-static void chain_join (saddle_plan *plan, pw_block_ldl *l, const chain_between *between) {
-  for (int p = 0; p < l->nodes;) {
-    const chain_between *b = &between[p++];
-    if (b->sources != 1 || b->link.bodies == 0) continue;
-    pw_chain *chain = &plan->chain[plan->chains++];
-    *chain = b->link;
-    chain->first_factor = 3 * (plan->linked + plan->chains - 1);
-    plan->is_linked[b->link.j / 3] = 1;
-    for (; p < l->nodes && between[p].sources == 1 && between[p].contributions == 2; p++) {
-      if (between[p].link.bodies == 0) break;
-      if (!chain_add (chain, &between[p - 1].link, &between[p].link)) break;
-      plan->is_linked[between[p].link.j / 3] = 1;
-      l->column[p].in_chain = 1;
-    }
-    const pw_block_column *last = &l->column[chain->first_column + chain->bodies];
-    chain->includes_last = chain->bodies > 1 && last[1].first_below == last->first_below;
-    plan->linked += chain->bodies;
-  }
-}
-
-/* Finds the chains, and marks their inner columns.  The contributions to each group in plan->list must be sorted by the
- * columns of their nodes in l.  PW_OK or PW_RESOURCE. */
+/* Finds the chains.  The contributions to each group in plan->list must be sorted by the columns of their nodes in l.
+ * PW_OK or PW_RESOURCE. */
 static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   size_t nodes = (size_t)l->nodes;
-  chain_between *between = pw_arena_alloc (&plan->arena, nodes * sizeof *between);
+  pw_chain_between *between = pw_arena_alloc (&plan->arena, nodes * sizeof *between);
   plan->chain = pw_arena_alloc (&plan->arena, nodes * sizeof *plan->chain);
   plan->is_linked = pw_arena_alloc (&plan->arena, (size_t)plan->groups);
   if (!between || !plan->chain || !plan->is_linked) return PW_RESOURCE;
@@ -1013,68 +973,43 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
       if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
     }
   }
-  /* fill-in: by columns eliminated earlier that have both a column and the next one below them */
-  for (int p = 0; p < l->nodes; p++)
-    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
-      if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
-  chain_join (plan, l, between);
+  plan->chains = pw_block_join_chains (l, between, plan->chain, plan->is_linked);
+  for (int c = 0; c < plan->chains; c++) plan->linked += plan->chain[c].bodies;
   return PW_OK;
 }
 
-/* The number of rows of massless components that may have entries in the columns of group g. */
-static int condense_known_rows (const saddle_plan *plan, int g) {
-  int rows = 0;
-  for (const pw_component *c = plan->saddle->component, *end = c + plan->saddle->components; c < end; c++)
-    for (int i = 0; i < c->groups; i++) rows += c->group[i].j == group_first (plan->saddle->s, g) ? c->rows : 0;
-  return rows;
-}
+/* ---- A dense matrix ---- */
 
-/* Appends group g to a dense matrix, unless it is massless; first: row of each node. */
-static void condense_dense_group (const saddle_plan *plan, pw_dense *d, int g, const int *first) {
+/* Appends group g, unless it is massless; first: row of each node. */
+static void condense_dense_group (const saddle_plan *plan, int g, const int *first) {
   const int j = group_first (plan->saddle->s, g), width = group_width (plan->saddle->s, j);
   int has_weight = 0;
   for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;
   if (!has_weight) return;
-  pw_dense_group *group = &d->group[d->groups++];
-  group->j = j, group->width = width;
-  for (int pins = 1, at = 0; pins >= 0; pins--)
+  pw_dense_add_group (plan->saddle->dense, j, width);
+  for (int is_pin = 1; is_pin >= 0; is_pin--)
     for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
       const plan_contribution *a = &plan->contribution[plan->list[x]];
-      for (int i = 0; i < plan->node[a->node].size && a->is_pin == pins; i++) {
-        const int row = first[a->node] + i, r = group->rows++;
-        group->pins += pins && i == 0;
-        group->J[r] = a->J + i * a->row_stride;
-        group->row[r] = (unsigned char)row;
-        for (int q = 0; q <= r; q++) {
-          const int with = group->row[q];
-          group->at[at++] = (unsigned char)(row > with ? row * d->n + with : with * d->n + row);
-          if (pins && (q & 1) == i)
-            d->S[group->at[at - 1]] += group->J[q][i] * group->J[r][i] * plan->saddle->inverse_weight[j + i];
-        }
-      }
+      if (a->is_pin == is_pin)
+        pw_dense_add_rows (plan->saddle->dense, is_pin, first[a->node], plan->node[a->node].size, a->J, a->row_stride);
     }
 }
 
 /* The dense matrix of a scene with few equations. */
 static int condense_dense (const saddle_plan *plan) {
+  pw_saddle *saddle = plan->saddle;
   int first[PW_DENSE], known = 0;
-  pw_dense *d = plan->saddle->dense = calloc (1, sizeof *d + (size_t)plan->groups * sizeof *d->group);
+  for (const pw_component *c = saddle->component; c < saddle->component + saddle->components; c++)
+    known += c->rows * c->groups;
+  pw_dense *d = saddle->dense = pw_dense_new (plan->groups, known, saddle->s->coords, saddle->inverse_weight);
   if (d == NULL) return PW_RESOURCE;
-  for (int g = 0; g < plan->groups; g++) known += condense_known_rows (plan, g);
-  d->known = calloc ((size_t)known + 1, sizeof *d->known);
-  d->zero = calloc (2 * (size_t)plan->saddle->s->coords, sizeof *d->zero);
-  if (d->known == NULL || d->zero == NULL) return PW_RESOURCE;
-  d->scratch = d->zero + plan->saddle->s->coords;
-  d->inverse_weight = plan->saddle->inverse_weight;
   for (int n = 0; n < plan->nodes; n++) {
     first[n] = d->n;
     for (int i = 0; i < plan->node[n].size; i++) d->unknown[d->n++] = plan->node[n].unknown + i;
   }
-  if (d->n > 2 && d->n % 2) {
-    d->unknown[d->n++] = d->unknown[0];
-    d->S[d->n * d->n - 1] = 1;
-  }
-  for (int g = 0; g < plan->groups; g++) condense_dense_group (plan, d, g, first);
+  pw_dense_pad (d);
+  for (int g = 0; g < plan->groups; g++) condense_dense_group (plan, g, first);
+  massless_list_known (saddle);
   return PW_OK;
 }
 
@@ -1100,9 +1035,8 @@ static int saddle_pivot_row (const pw_saddle *saddle) {
   const pw_block_ldl *l = saddle->block;
   const pw_dense *d = saddle->dense;
   if (l == NULL && d == NULL) return saddle->dependent_row;
-  const int row = (d ? d->least_pivot : l->least_pivot) > saddle->pivot ? -1
-                  : d                                                   ? pw_dense_least_unknown (d)
-                                                                        : l->least_unknown;
+  if ((d ? d->least_pivot : l->least_pivot) > saddle->pivot) return -1;
+  const int row = d ? pw_dense_least_unknown (d) : l->least_unknown;
   return row >= 0 && row < saddle->s->rows && saddle->component_of_row[row] < 0 ? row : -1;
 }
 
@@ -1219,7 +1153,6 @@ static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
     if (status == PW_OK) status = condense_block (plan);
   }
   if (status != PW_OK) return status;
-  if (saddle->dense) massless_list_known (saddle);
   saddle->run = saddle->components ? (saddle->dense ? saddle_run_massless_dense : saddle_run_massless_sparse)
                                    : (saddle->dense ? saddle_run_dense : saddle_run_sparse);
   return PW_OK;

@@ -29,8 +29,8 @@ typedef struct pw_saddle {
   int dependent_row;          /* one that depends on others in every configuration; -1: none */
   int *inactive;              /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
-  double pivot; /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
-                  * before it; of massless coordinates, see massless_forward_all */
+  double pivot; /* smallest when last factorised: of S, the squared sine of the angle between a row and those before
+                 * it; of massless coordinates, see massless_forward_all */
   char *memory, *component_memory;
 } pw_saddle;
 
