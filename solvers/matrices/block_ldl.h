@@ -129,8 +129,8 @@ void pw_block_close (pw_block_ldl *l); /* l may be NULL */
  * in a chain, and marks inner columns.  Adds fill-in to the sources.  Returns the number of chains. */
 int pw_block_join_chains (pw_block_ldl *l, pw_chain_between *between, pw_chain *chain, unsigned char *is_linked);
 
-/* Lays out the values, after the chains have been joined.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31 values
- * or more. */
+/* Lays out the values, after the chains have been joined.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31
+ * values or more. */
 int pw_block_lay_out (pw_block_ldl *l);
 
 /* Index in `value` of the block of two coupled nodes: rows of the one eliminated later.  After pw_block_lay_out. */
