@@ -663,7 +663,7 @@ typedef struct {
 /* ---- What an element type provides ---- */
 
 /* PW_POINT: fixed in a body; point i of a definition is in the frame of its body i.  PW_VECTOR: any other pair.
- * PW_TRACK: a path or NULL; models and systems become owners of it. */
+ * PW_TRACK: a path or NULL, at most one; models and systems become owners of it. */
 typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE, PW_TEXT, PW_TRACK } pw_field_type;
 
 /* One field of a definition structure: used by validation, text models, `show`, `list kinds` and the manual. */

@@ -69,18 +69,20 @@ static const char *fault_field (const pw_kind *kind, const pw_field *f) {
 
 /* The fault of the fields, or ""; the text may be in the buffer. */
 static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size) {
-  int bodies = 0, signals = 0, limits = 0;
+  int bodies = 0, signals = 0, limits = 0, paths = 0;
   if (kind->fields == NULL) return "no table of fields";
   for (const pw_field *f = kind->fields; f->name; f++) {
     const char *fault = fault_field (kind, f);
     if (*fault) return pw_print (buffer, size, "field %.50s: %s", f->name, fault);
     if (f->type == PW_BODY) bodies += pw_field_count (f);
+    if (f->type == PW_TRACK) paths += pw_field_count (f);
     if (f->limit && (f->type != PW_SIGNAL || f->count > 1))
       return pw_print (buffer, size, "field %.50s: a limit that is not one signal", f->name);
     if (f->type == PW_SIGNAL && !f->limit && limits) return "signals after those of limits";
     if (f->type == PW_SIGNAL && !f->limit) signals += pw_field_count (f);
     limits |= f->limit;
   }
+  if (paths > 1) return "more than one path";
   if (kind->each_body && (bodies > 0 || kind->bodies != 1))
     return "an element type that acts on each body has one body and no body fields";
   if (!kind->each_body && bodies != kind->bodies) return "bodies is not the sum of the counts of PW_BODY fields";
@@ -227,9 +229,9 @@ int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
       return pw_fail (error, PW_INPUT, "model %s: body %s: %s = %g: expected %s", m->name, b->name, field[i].name,
                       field[i].value, expected);
   }
-  int finite = b->outline || b->corners == 0;
-  for (int i = 0; finite && i < b->corners; i++) finite = isfinite (b->outline[i][0]) && isfinite (b->outline[i][1]);
-  if (finite && (b->corners == 0 || (b->corners >= 3 && b->corners <= PW_MOST_CORNERS))) return PW_OK;
+  int fits = b->corners == 0 || (b->outline && b->corners >= 3 && b->corners <= PW_MOST_CORNERS), finite = 1;
+  for (int i = 0; fits && i < b->corners; i++) finite &= isfinite (b->outline[i][0]) && isfinite (b->outline[i][1]);
+  if (fits && finite) return PW_OK;
   return pw_fail (error, PW_INPUT, "model %s: body %s: its outline has %d corners%s: expected 3 to %d", m->name,
                   b->name, b->corners, finite ? "" : ", not all of them finite", PW_MOST_CORNERS);
 }
@@ -500,9 +502,8 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
     *body = model_copy_text (m, *body);
   }
   for (int i = 0; (text = pw_field_mutable (kind, copy, PW_TEXT, i)) != NULL; i++) *text = model_copy_text (m, *text);
-  pw_path **path;
-  for (int i = 0; (path = pw_field_mutable (kind, copy, PW_TRACK, i)) != NULL; i++)
-    if (*path) pw_model_keep (m, pw_path_share (*path), model_close_path);
+  pw_path **path = pw_field_mutable (kind, copy, PW_TRACK, 0);
+  if (path && *path) pw_model_keep (m, pw_path_share (*path), model_close_path);
   pw_signal *signal;
   for (int i = 0; (signal = pw_field_mutable (kind, copy, PW_SIGNAL, i)) != NULL; i++) model_copy_signal (m, signal);
   m->element[m->elements++] = (pw_element){ kind, copy };

@@ -192,6 +192,8 @@ static void kinds_expect_fault (const pw_kind *kind, const char *fault) {
 }
 
 static const pw_field kinds_choice[] = { { .name = "mode", .offset = 8, .type = PW_CHOICE }, { .name = NULL } };
+static const pw_field kinds_paths[] = { { .name = "path", .offset = 8, .type = PW_TRACK, .count = 2 },
+                                        { .name = NULL } };
 static const pw_field kinds_typeless[] = { { .name = "mode", .offset = 8, .type = (pw_field_type)77 },
                                            { .name = NULL } };
 static const pw_field kinds_far[] = { { .name = "mode", .offset = SIZE_MAX - 3, .type = PW_NUMBER }, { .name = NULL } };
@@ -253,6 +255,7 @@ TEST (faults) {
   KINDS_FAULT (fields, kinds_far,
                "field mode: outside the definition, whose first member is its name and whose sizeof is .definition");
   KINDS_FAULT (fields, kinds_choice, "field mode: a choice without choices");
+  KINDS_FAULT (fields, kinds_paths, "more than one path");
   KINDS_FAULT (bodies, 3, "bodies is not the sum of the counts of PW_BODY fields");
   KINDS_FAULT (signals, 1, "signals is not the sum of the counts of PW_SIGNAL fields");
   KINDS_FAULT (each_body, 1, "an element type that acts on each body has one body and no body fields");

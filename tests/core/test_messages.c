@@ -57,6 +57,11 @@ TEST (bad_bodies) {
   BAD (": body x: rate vx = nan: expected a finite number", BODY (.name = "x", .rate = { NAN, 0, 0 }));
   BAD (": body x: rate vy = nan: expected a finite number", BODY (.name = "x", .rate = { 0, NAN, 0 }));
   BAD (": body x: rate omega = nan: expected a finite number", BODY (.name = "x", .rate = { 0, 0, NAN }));
+  static const double outline[3][2] = { { 0, 0 }, { 1, 0 }, { 0, INFINITY } };
+  BAD (": body x: its outline has 3 corners, not all of them finite: expected 3 to 2000",
+       BODY (.name = "x", .corners = 3, .outline = outline));
+  BAD (": body x: its outline has 1000000000 corners: expected 3 to 2000",
+       BODY (.name = "x", .corners = 1000000000, .outline = outline));
 }
 
 TEST (bad_references) {
