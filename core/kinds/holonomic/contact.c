@@ -17,8 +17,8 @@
  *
  *   e' = b (e.D') n,  n' = -b (e.D') e,  b' = (dk/ds) e.D' / (1 - k d)^3 + b^2 n.D'
  *
- * so that gamma of the line is increased by b (e.D')^2, of friction decreased by b (e.D') (n.D').  1 - k d > 0, since a
- * disc that does not fit everywhere is refused; only one place can then be touched.
+ * so that gamma of the line is increased by b (e.D')^2, of friction decreased by b (e.D') (n.D').  Where they
+ * touch, 1 - k d > 0, since a disc that does not fit everywhere is refused; only one place can then be touched.
  *
  * N = -lambda >= 0 [N] acts on body 1 along the normal, away from body 2; T = -lambda along e, with |T| <= mu N
  * (Coulomb), opposite to u where they slide; both at the point of contact.  Body 2 receives the opposite. */
@@ -196,6 +196,8 @@ TOUCH_GAP (jw_q, 6)
 TOUCH_GAP (gamma_q, 6)
 TOUCH_GAP (gamma_v, 6)
 
+J_GAMMA (touch, 6, 1)
+
 static void touch_limits (const void *definition, pw_bounds *limit) {
   limit->most = 0;
   limit->restitution = ((const pw_contact *)definition)->restitution;
@@ -240,6 +242,8 @@ PER_ELEMENT (rub_gamma, rub, 1) {
 }
 
 /* ((D w) turned^T D + e^T (D w)_q) / L, as rod_jw_q */
+J_GAMMA (rub, 6, 1)
+
 PER_ELEMENT (rub_jw_q, rub, 6) {
   const points_state *ends = &now.rod.ends;
   double e[2], Dw[2] = { 0, 0 };
@@ -337,6 +341,7 @@ const pw_kind pw_kind_contact = {
   REACTION ("N", "N", "force on the first body along the normal, away from the second"),
   POSITION (touch),
   CONSTRAINT (touch),
+  .J_gamma = touch_J_gamma,
   .limits = touch_limits,
   .companion = &pw_kind_contact_friction,
   .has_companion = touch_has_friction,
@@ -355,6 +360,7 @@ const pw_kind pw_kind_contact_friction = {
   REACTION ("T", "N",
             "friction on the first body, along the heading of the line or, of discs, the normal turned by -90 deg"),
   CONSTRAINT (rub),
+  .J_gamma = rub_J_gamma,
   .loss = rub_loss,
   .limits = rub_limits,
 };
