@@ -349,9 +349,10 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
   if (pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration, where the status
- * is PW_RETRY if the sine is at most r->refused_sine. */
+/* Factorises and solves, with gamma of the constraints in the array of lambda; *near = 1 near a singular configuration,
+ * where the status is PW_RETRY if the sine is at most r->refused_sine. */
 PW_INLINE int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
+  if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, lambda);
   const double *f = dynamics_forces (r, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
@@ -364,7 +365,6 @@ PW_INLINE int dynamics_solve (pw_run *r, const double *v, double *a, double *lam
 
 int pw_run_accelerate_by_gamma (pw_run *r, const double *v, double *a, double *lambda) {
   int near;
-  if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, lambda);
   return dynamics_solve (r, v, a, lambda, &near);
 }
 
@@ -378,7 +378,6 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
   int near, status = pw_update_kinematics (r->w, t, q, v);
   if (status != PW_OK) return status;
   pw_evaluate_J_gamma (r->w, lambda);
-  if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, lambda);
   status = dynamics_solve (r, v, a, lambda, &near);
   if (near) r->near_singular = 1;
   return status;

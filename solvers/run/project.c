@@ -160,8 +160,8 @@ static int project_state (pw_projector *p, pw_run *r, double t, double *q, doubl
   if (status != PW_OK) return status;
   if (project_accepts_velocities (p, r)) return pw_run_accelerate_by_gamma (r, v, a, lambda);
   status = pw_project_velocities (p, r, v);
-  if (status != PW_OK || p->owns_velocity)
-    return status == PW_OK ? pw_run_accelerate_evaluated (r, v, a, lambda) : status;
+  if (status != PW_OK) return status;
+  if (p->owns_velocity) return pw_run_accelerate_evaluated (r, v, a, lambda);
   pw_run_accelerate_updated (r, v, a, lambda);
   return PW_OK;
 }
