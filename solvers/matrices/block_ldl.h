@@ -125,8 +125,8 @@ typedef struct {
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l); /* l may be NULL */
 
-/* Joins the links to chains, at most one for each node, and marks their inner columns; is_linked[b] becomes 1 for a body
- * b in a chain.  Adds fill-in to the sources.  Returns the number of chains. */
+/* Joins the links to chains, at most one for each node, and marks their inner columns; is_linked[b] becomes 1 for each
+ * body b in a chain.  Adds fill-in to the sources.  Returns the number of chains. */
 int pw_block_join_chains (pw_block_ldl *l, pw_chain_between *between, pw_chain *chain, unsigned char *is_linked);
 
 /* Lays out the values, after the chains have been joined.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31
