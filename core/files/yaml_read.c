@@ -126,6 +126,16 @@ static void suggest_state (const pw_reader *r, const char *text, pw_expression_e
   if (near.near) snprintf (error->text, sizeof error->text, "there is no \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
+/* Replaces the text of an error at a unit after a number by one that says that the field measures something else. */
+static void refuse_unit (const pw_reader *r, const char *text, pw_expression_error *error) {
+  const size_t sign = *text == '+' || *text == '-', n = sign + pw_number_size (text + sign);
+  const char *unit = text + n + strspn (text + n, " ");
+  if (n > sign && error->at == (size_t)(unit - text) && pw_names_find (&r->scope->index, unit) < 0 &&
+      pw_unit_factor (unit, r->field->unit, &(double){ 0 }) == PW_RETRY)
+    snprintf (error->text, sizeof error->text, "expected a number in %s, which %.40s does not measure", r->field->unit,
+              unit);
+}
+
 int pw_yaml_varies (const pw_reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;)
@@ -142,6 +152,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
                          : pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status == PW_INPUT) suggest_state (r, node->text, &error);
+  if (status == PW_INPUT && r->field && r->scope && label == r->label) refuse_unit (r, node->text, &error);
   if (status != PW_OK)
     return read_fail (r, pw_source_offset (r->y, node, error.at), "%s: %s", label,
                       find_variable (r, node->text) == node->text + error.at
