@@ -265,44 +265,45 @@ char *pw_library_versions (char *buffer, size_t size) {
  * The difference from the polynomial of the next lower degree estimates the error.  Powers may vanish at the ends of
  * all steps but not between them, so the work and losses of a step are also compared with the change of energy. */
 
-enum { QUADRATURE_BY_METHOD = -1 }; /* in place of a degree */
+/* Gauss quadrature with four nodes, exact up to degree 7: the outer and the inner ones. */
+static const double quadrature_node[] = { 0.8611363115940526, 0.3399810435848563 },
+                    quadrature_weight[] = { 0.3478548451374538, 0.6521451548625461 };
 
-/* The rates at t: of the polynomial of this degree through those at the newest states (Lagrange's formula), or
- * QUADRATURE_BY_METHOD. */
-static int quadrature_rates (const pw_sun *x, int degree, double t, double *rate) {
-  pw_run *r = x->run;
-  if (degree == QUADRATURE_BY_METHOD) return x->rates (r, t, rate);
-  memset (rate, 0, (size_t)r->entries * sizeof *rate);
-  for (int i = 0; i <= degree; i++) {
-    double at_t = 1, at_node = 1;
-    for (int j = 0; j <= degree; j++)
-      if (j != i) at_t *= t - x->t[j], at_node *= x->t[i] - x->t[j];
-    pw_add_scaled (rate, x->rate[i], at_t / at_node, r->entries);
+/* x->integral: between two times, of the polynomial of this degree through the rates at the newest states (Lagrange's
+ * formula); x->node: less that of the polynomial of the next lower degree (Newton's formula). */
+static void quadrature_polynomial (const pw_sun *x, int degree, double from, double to) {
+  const int entries = x->run->entries;
+  const double half = (to - from) / 2;
+  double last = 0; /* integral of the product of t - t_j, j < degree */
+  memset (x->integral, 0, (size_t)entries * sizeof *x->integral);
+  memset (x->node, 0, (size_t)entries * sizeof *x->node);
+  for (int i = degree; i >= 0; i--) {
+    double sum = 0, at_node = 1;
+    for (int k = 0; k < 4; k++) {
+      const double t = from + half + (k < 2 ? -half : half) * quadrature_node[k % 2];
+      double product = half * quadrature_weight[k % 2];
+      for (int j = 0; j <= degree; j++) product *= j == i ? 1 : t - x->t[j];
+      sum += product;
+    }
+    for (int j = 0; j <= degree; j++) at_node *= j == i ? 1 : x->t[i] - x->t[j];
+    if (i == degree) last = sum;
+    pw_add_scaled (x->integral, x->rate[i], sum / at_node, entries);
+    pw_add_scaled (x->node, x->rate[i], last / at_node, entries);
   }
-  return PW_OK;
 }
 
-/* The integrals between two times by Gauss quadrature with four nodes, exact up to degree 7, in each of equal parts. */
-static int quadrature_gauss (const pw_sun *x, int degree, double from, double to, int parts, double *integral) {
+/* The integrals, in x->finer, between two times of the rates that the method interpolates, in each of equal parts. */
+static int quadrature_gauss (const pw_sun *x, double from, double to, int parts) {
   pw_run *r = x->run;
-  static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
-                      weight[] = { 0.3478548451374538, 0.6521451548625461 };
   double half = (to - from) / parts / 2;
-  memset (integral, 0, (size_t)r->entries * sizeof *integral);
+  memset (x->finer, 0, (size_t)r->entries * sizeof *x->finer);
   for (int i = 0; i < 4 * parts; i++) {
     double middle = from + (2 * (i / 4) + 1) * half, side = i % 4 < 2 ? -1 : 1;
-    int status = quadrature_rates (x, degree, middle + side * node[i % 2] * half, x->node);
+    int status = x->rates (r, middle + side * quadrature_node[i % 2] * half, x->node);
     if (status != PW_OK) return status;
-    pw_add_scaled (integral, x->node, half * weight[i % 2], r->entries);
+    pw_add_scaled (x->finer, x->node, half * quadrature_weight[i % 2], r->entries);
   }
   return PW_OK;
-}
-
-/* The difference between x->finer and x->integral in a step of size h, in tolerances; in the scratch x->node. */
-static double quadrature_change (const pw_sun *x, double h) {
-  pw_run *r = x->run;
-  for (int e = 0; e < r->entries; e++) x->node[e] = x->finer[e] - x->integral[e];
-  return pw_ledger_norm (r, h, x->node);
 }
 
 /* Halves the parts until the integrals, in x->integral, converge; stops if powers cannot be evaluated. */
@@ -311,8 +312,9 @@ static void quadrature_refine (pw_sun *x, double from, double to) {
   const int most = 64; /* 256 nodes */
   double change = INFINITY;
   for (int parts = 1; parts <= most && change > 1; parts *= 2) {
-    if (quadrature_gauss (x, QUADRATURE_BY_METHOD, from, to, parts, x->finer) != PW_OK) return;
-    change = quadrature_change (x, x->t[0] - x->t[1]);
+    if (quadrature_gauss (x, from, to, parts) != PW_OK) return;
+    for (int e = 0; e < r->entries; e++) x->node[e] = x->finer[e] - x->integral[e];
+    change = pw_ledger_norm (r, x->t[0] - x->t[1], x->node);
     memcpy (x->integral, x->finer, (size_t)r->entries * sizeof *x->integral);
   }
 }
@@ -334,10 +336,8 @@ int pw_sun_integrate_ledger (pw_sun *x, int order) {
   quadrature_store_rates (x);
   if (x->points <= last) x->points++;
   x->order = order;
-  const int degree = quadrature_degree (x, order);
-  (void)quadrature_gauss (x, degree, x->t[1], x->t[0], 1, x->integral);
-  (void)quadrature_gauss (x, degree - 1, x->t[1], x->t[0], 1, x->finer);
-  const double error = quadrature_change (x, h), before = x->energy;
+  quadrature_polynomial (x, quadrature_degree (x, order), x->t[1], x->t[0]);
+  const double error = pw_ledger_norm (r, h, x->node), before = x->energy;
   x->energy = pw_energy (r, r->v);
   double defect = x->energy - before; /* of the energy: its change, less work, plus losses */
   for (int e = 0; e < r->s->entries; e++) defect -= r->s->entry[e].type == PW_WORK ? x->integral[e] : -x->integral[e];
@@ -356,7 +356,7 @@ void pw_sun_ledger_at (pw_sun *x, double t) {
     memcpy (r->ledger_at, r->ledger, (size_t)entries * sizeof (double));
     return;
   }
-  (void)quadrature_gauss (x, quadrature_degree (x, x->order), x->t[1], t, 1, x->integral);
+  quadrature_polynomial (x, quadrature_degree (x, x->order), x->t[1], t);
   if (x->refined) quadrature_refine (x, x->t[1], t);
   for (int e = 0; e < entries; e++) r->ledger_at[e] = x->ledger0[e] + x->integral[e];
 }

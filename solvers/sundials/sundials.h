@@ -45,7 +45,7 @@ typedef struct {
   double *rate[PW_SUN_POINTS]; /* entries: rates there */
   double *ledger0;             /* entries: at the beginning of the last step */
   double *integral;            /* entries: over the last step, or a part of it */
-  double *finer, *node;        /* entries: scratch: the same with more nodes or of a lower degree; rates at a node */
+  double *finer, *node;        /* entries: scratch: the same with more nodes; rates at a node, or a difference */
   double energy;               /* kinetic + potential energy of the state reached [J] */
   char *memory;
 } pw_sun;
