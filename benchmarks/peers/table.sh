@@ -13,19 +13,19 @@ OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 "${PYTHON:-python3}" "$here/scipy_run.p
 "$work/simbody" >"$work/simbody.txt"
 
 # Times depend on other programs of the machine: two digits.
-short=' function short (x) { return sprintf ("%.2g", x) + 0 }'
+short=' function short(x) { return sprintf ("%.2g", x) + 0 }'
 
 # cost FILE ERROR: interpolated between the logarithms of errors and times [ms]
 cost () {
   awk -v error="$2" '
     { e = log ($1); t = log ($2)
-      if (NR > 1 && !done && e <= log (error) && before > log (error)) { printf "%s", short (exp (last + (t - last) * (log (error) - before) / (e - before))); done = 1 }
-      if (NR == 1 && e <= log (error)) { printf "%s", short ($2); done = 1 }
+      if (NR > 1 && !done && e <= log (error) && before > log (error)) { printf "%s", short(exp (last + (t - last) * (log (error) - before) / (e - before))); done = 1 }
+      if (NR == 1 && e <= log (error)) { printf "%s", short($2); done = 1 }
       before = e; last = t }
     END { if (!done) printf "-" }'"$short" "$1"
 }
 # column NAME FIELD: times of Pinwheel or of the program by hand, from the table of peers
-column () { awk -F, -v row="$1" -v field="$2" '$1 == "erk8+projection" && index ($0, row) { printf " %s |", short ($field) }'"$short" "$work/peers.csv" | cut -d'|' -f1-3; }
+column () { awk -F, -v row="$1" -v field="$2" '$1 == "erk8+projection" && index ($0, row) { printf " %s |", short($field) }'"$short" "$work/peers.csv" | cut -d'|' -f1-3; }
 
 echo '| program | 1e-3 m | 1e-6 m | 1e-9 m |'
 echo '|---|---|---|---|'
