@@ -60,7 +60,8 @@ try () {
   shift 5
   "$pinwheel" page "$model" --t-end "$t_end" "$@" -o "$work/page.html" 2>"$work/log"
   report "$name: the page is written" $?
-  ! grep -Eq '(src|href)=|https?://|@import|\bNaN\b' "$work/page.html" && tail -n 1 "$work/page.html" | grep -q '</html>'
+  # The engine in base 64 is left out: its letters may happen to be one of these words.
+  ! sed -E 's/[A-Za-z0-9+/]{500,}=*//g' "$work/page.html" | grep -Eq '(src|href)=|https?://|@import|\bNaN\b' && tail -n 1 "$work/page.html" | grep -q '</html>'
   report "$name: it is complete and needs nothing else" $?
   [ -n "$browser" ] || { echo "# skipped: no browser was found to show it"; return; }
   sed -i "s|</head>|<script>const wanted = { name: \"$parameter\", value: $value };</script></head>|${forbidden:+; s/$forbidden//}" "$work/page.html"
