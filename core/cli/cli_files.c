@@ -14,8 +14,6 @@
 
 enum { FILES_FOLDER = 4064 }; /* longest name of a folder: the paths of files in it have room in 4096 bytes */
 
-/* ---- Checks ---- */
-
 typedef struct {
   pw_use *use;
   int count;
@@ -89,8 +87,6 @@ int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error
   return status;
 }
 
-/* ---- Tables ---- */
-
 /* Moves *at past a cell, and stores its text, unless `cell` is NULL, without quotes, which are doubled inside; returns
  * what ends the cell. */
 static char table_cell (const char **at, pw_text *cell) {
@@ -117,7 +113,6 @@ static int table_row (const char **at, int k, pw_text *cell, double *value) {
   return (cell->length && pw_read_number (cell->chars, value) != PW_OK) || quoted;
 }
 
-/* Writes column k of a table without its heading as items of JSON. */
 static void table_json (const char *rows, int k, pw_json *j, pw_text *cell) {
   double value;
   for (const char *at = rows; *at;)
@@ -156,7 +151,6 @@ static int table_npz (const char *rows, long count, int k, const char *name, pw_
   return status;
 }
 
-/* Writes a CSV table as NPZ or JSON. */
 static int table_convert (const char *csv, int is_json, FILE *f, pw_error *error) {
   const char *rows = strchr (csv, '\n') ? strchr (csv, '\n') + 1 : "", *at = csv;
   pw_text name = { .chars = NULL }, cell = { .chars = NULL };
@@ -201,8 +195,6 @@ int pw_cli_write_table (const char *path, FILE *f, const void *context,
   return status;
 }
 
-/* ---- Folders ---- */
-
 static int folder_make (pw_folder *folder, pw_error *error) {
   char path[FILES_FOLDER + 1];
   size_t n = strlen (folder->path);
@@ -241,8 +233,6 @@ void pw_folder_close (pw_folder *folder) {
   if (folder->locked) close (folder->lock);
 }
 
-/* ---- The files that a command writes ---- */
-
 int pw_files_open (pw_cli_line *line, pw_use *use, int count, pw_error *error) {
   int status = pw_cli_check_uses (line, use, count, error);
   for (int i = 1; i < count && status == PW_OK; i++) { /* use[0] is the model */
@@ -270,8 +260,6 @@ void pw_files_close (pw_files *files) {
     if (files->output[i]) pw_output_discard (files->output[i]);
   pw_folder_close (&files->folder);
 }
-
-/* ---- Fingerprints ---- */
 
 void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value) {
   pw_text_add (t, key);

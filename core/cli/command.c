@@ -53,8 +53,6 @@ static int command_keep (const pw_command *command, pw_cli_line *line, int i, pw
   return pw_fail (error, PW_INPUT, "%s: option --%s is given twice", command->name, o->longName);
 }
 
-/* ---- Help ---- */
-
 static void command_option_help (const struct poptOption *o) {
   enum { COLUMN = 28 };
   const char *letter = o->shortName ? PW_PRINTED (8, "-%c,", o->shortName) : "   ";
@@ -80,8 +78,6 @@ static void command_help (const pw_command *command) {
   command_option_help (&command_help_option);
 }
 
-/* ---- Reading ---- */
-
 /* Writes the commands that have an option of this name, " (an option of sweep, drift)"; "" if none has. */
 static const char *command_others (const pw_command *const *all, const char *name, char text[PW_HINT]) {
   int used = 0;
@@ -94,7 +90,6 @@ static const char *command_others (const pw_command *const *all, const char *nam
   return text;
 }
 
-/* Reports the option that popt has refused with this error code. */
 static int command_refuse (const pw_command *command, const pw_command *const *all, const pw_cli_line *line, int code,
                            pw_error *error) {
   const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS), *name = option + strspn (option, "-");
@@ -171,8 +166,6 @@ int pw_cli_main (const pw_command *command, const pw_command *const *all, int ar
   if (line) command_close (line);
   return exit_status > 0 ? exit_status : pw_cli_report_error (&error);
 }
-
-/* ---- Values ---- */
 
 int pw_cli_requires (const char *option, const char *value, const char *required, int is_given, pw_error *error) {
   if (value == NULL || is_given) return PW_OK;
@@ -321,7 +314,6 @@ int pw_cli_no_parameter (const pw_file *file, pw_model *m, const char *name, int
                   states ? " or state" : "", name, states ? "" : "--start ", state.best);
 }
 
-/* Sets a parameter that the model does not have: fails with a hint. */
 static int cli_set_other (const pw_cli_line *line, pw_model *m, const char *text, const char *name, pw_error *error) {
   const char *included = pw_file_included_parameter (line->m.file, name);
   if (pw_cli_is_state (line->m.file, name))
@@ -359,7 +351,6 @@ const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name) {
   return p && p->name ? p : NULL;
 }
 
-/* Checks method i of line->methods, of this file. */
 static int cli_check_method (const pw_cli_line *line, int i, const char *path, pw_error *error) {
   static const char sign[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
   const char *name = line->methods[i]->name;
@@ -373,7 +364,6 @@ static int cli_check_method (const pw_cli_line *line, int i, const char *path, p
                   name);
 }
 
-/* Compiles the files of --method-file, and makes the list of their methods. */
 static int cli_method_files (pw_cli_line *line, pw_error *error) {
   size_t files = 0, count = 0;
   while (line->method_files && line->method_files[files]) files++;

@@ -47,8 +47,6 @@ static void list_fields (pw_table *t, const pw_field *fields) {
   }
 }
 
-/* ---- Descriptions of methods and element types by name ---- */
-
 /* Describes the entry of each name, or all entries for the name "all".  The first member of an entry is its name;
  * entries and names end with NULL.  `noun`: what an entry is, such as "element type". */
 static int list_named (const char *noun, const void *const *entries, void (*describe) (const void *entry),
@@ -69,9 +67,6 @@ static int list_named (const char *noun, const void *const *entries, void (*desc
   return PW_OK;
 }
 
-/* ---- Models ---- */
-
-/* Raises *context, an int, to the length of the name. */
 static int list_longest (void *context, const char *name, const char *path) {
   int *width = context, length = (int)strlen (name);
   (void)path;
@@ -103,8 +98,6 @@ static int list_models (const char **name, pw_error *error) {
   return status;
 }
 
-/* ---- Methods ---- */
-
 static void list_method (const pw_method *m) {
   printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "adaptive steps; --rtol, --atol" : "fixed steps; --step",
           m->about);
@@ -133,8 +126,6 @@ static int list_methods (const char **name, pw_error *error) {
   puts ("`pinwheel list methods NAME...` shows the options of a method, `pinwheel list methods all` those of all");
   return PW_OK;
 }
-
-/* ---- Element types ---- */
 
 static void list_quantities (const char *title, const pw_quantity *q, int count) {
   if (count > 0) printf ("    %s\n", title);
@@ -196,8 +187,6 @@ static int list_kinds (const char **name, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Signals ---- */
-
 static int list_signals (const char **name, pw_error *error) {
   (void)name, (void)error;
   puts ("A signal is a number, an expression of time (in C a function), or one of these forms:");
@@ -247,8 +236,6 @@ static int list_overview (pw_error *error) {
   puts ("\n`pinwheel list models`, `methods`, `kinds` (element types) or `signals` describes them.");
   return PW_OK;
 }
-
-/* ---- The command ---- */
 
 static int list_command (void *options, pw_error *error) {
   static const struct {

@@ -10,15 +10,11 @@
 #include "util.h"
 #include "cli.h"
 
-/* ---- Columns ---- */
-
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error) {
   pw_error own = { 0 };
   const int status = pw_system_find_column (s, name, c, &own);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "%s: %s", origin, own.text);
 }
-
-/* ---- Texts ---- */
 
 static const char *const outcome_prefix[] = { "final:",    "max:", "min:",    "mean:",
                                               "integral:", "rms:", "events:", "event:" };
@@ -181,7 +177,6 @@ static int outcome_refuse_call (const char *text, const char *origin, pw_error *
   return PW_OK;
 }
 
-/* Makes the formula of an output from its text, with variables in place of columns. */
 static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *origin, pw_error *error) {
   char text[4000], name[300];
   size_t used = 0;
@@ -252,8 +247,6 @@ void pw_outcomes_close (pw_outcomes *set) {
   *set = (pw_outcomes){ .system = NULL };
 }
 
-/* ---- Values ---- */
-
 double pw_outcome_value (const pw_outcomes *set, int outcome) {
   const pw_outcome *o = set->outcome + outcome;
   double value[PW_FORMULA_NAMES] = { 0 };
@@ -314,8 +307,6 @@ typedef struct {
   pw_error *error;
 } functional_step;
 
-/* ---- Values ---- */
-
 /* Stores the columns in a sample as values[at] of their functionals. */
 static int functional_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error) {
   for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
@@ -338,8 +329,6 @@ static double functional_at (functional_step *step, const pw_functional *f, doub
   return step->status == PW_OK ? f->values[FUNCTIONAL_OTHER] : NAN;
 }
 
-/* ---- Integrals ---- */
-
 /* pw_settings.integrand, NaN where contact points cannot be evaluated. */
 static void functional_integrands (void *context, const pw_sample *s, double *value) {
   pw_outcomes *set = context;
@@ -359,9 +348,6 @@ static double functional_of_integral (const pw_functional *f, double integral, d
   return f->type == PW_MEAN ? integral / span : sqrt (fmax (integral / span, 0));
 }
 
-/* ---- Extrema ---- */
-
-/* Keeps a value if it is beyond the extremum so far. */
 static void functional_update_extremum (pw_functional *f, double t, double value) {
   if (f->type == PW_MAX ? value > f->value : value < f->value) f->value = value, f->t = t;
 }
@@ -473,8 +459,6 @@ static void functional_extrema (functional_step *step, int halvings) {
   }
 }
 
-/* ---- Along the run ---- */
-
 void pw_outcomes_settings (pw_outcomes *set, pw_settings *settings) {
   settings->ledger |= set->ledger;
   settings->integrals = set->integrals, settings->integrand = functional_integrands;
@@ -487,7 +471,6 @@ static void functional_values_at_times (functional_step *step) {
     if (f->type == PW_AT_TIME && isnan (f->value) && f->t <= step->t1) f->value = functional_at (step, f, f->t);
 }
 
-/* Searches the condition in the step, which ends where it becomes true. */
 static void functional_check_condition (functional_step *step) {
   double t = NAN;
   if (step->set->condition && step->status == PW_OK)

@@ -24,8 +24,6 @@ int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
   return status;
 }
 
-/* ---- Threads ---- */
-
 /* For timed tasks (below): cores to which threads are bound. */
 typedef struct {
   cpu_set_t all;                /* processors that this process may use */
@@ -97,8 +95,6 @@ int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *er
   parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs };
   return parallel_run (&p);
 }
-
-/* ---- Timed tasks ---- */
 
 /* The first processor on the same physical core; the processor itself if that is unknown. */
 static int parallel_first_sibling (int processor) {

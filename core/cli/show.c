@@ -83,7 +83,6 @@ static void yaml_signal (const pw_signal *s, int digits) {
   }
 }
 
-/* The values of a field as in a text model. */
 static void yaml_field (const pw_field *f, const void *structure_field, int digits) {
   int count = pw_field_count (f);
   if (count > 1) putchar ('[');
@@ -247,8 +246,6 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   for (int i = 0; i < ref->states; i++) printf ("  %s: ", ref->state[i]), yaml_text (ref->text[i]), putchar ('\n');
   return PW_OK;
 }
-
-/* ---- The description ---- */
 
 enum { SHOW_DIGITS = 6 };
 
@@ -442,8 +439,6 @@ static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
   pw_run_close (run);
   return status;
 }
-
-/* ---- The command ---- */
 
 typedef struct {
   pw_cli_line line;

@@ -81,8 +81,6 @@ int pw_cli_report_error (const pw_error *error) {
   return -error->status;
 }
 
-/* ---- Progress ---- */
-
 #define PROGRESS_DELAY 0.5        /* time before the bar appears [s], so that short runs show none */
 #define PROGRESS_BAR_INTERVAL 0.1 /* between drawings of the bar [s] */
 #define PROGRESS_LINE_INTERVAL 60 /* between lines without a terminal [s] */
@@ -177,8 +175,6 @@ void pw_progress_end (pw_progress *p) {
   p->drawn = 0;
 }
 
-/* ---- Strings and cells ---- */
-
 void pw_text_clear (pw_text *t) {
   t->length = 0;
   t->failed = 0;
@@ -255,8 +251,6 @@ int pw_cli_close_table (pw_output *o, int status, pw_error *error) {
   return status;
 }
 
-/* ---- Requests to stop ---- */
-
 _Static_assert(ATOMIC_INT_LOCK_FREE == 2, "a handler of signals may change only atomic objects without a lock");
 atomic_int pw_stop;
 static atomic_int stop_signals; /* since pw_stop_catch */
@@ -308,8 +302,6 @@ int pw_stop_release (void) {
   stop_set (stop_at_once);
   return stop_signals;
 }
-
-/* ---- Limits ---- */
 
 void pw_limit_start (pw_limit *limit) {
   limit->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);

@@ -37,12 +37,9 @@ typedef struct {
 #define columns_fail(c, ...) \
   pw_fail ((c)->error, PW_INPUT, "%.80s:%d: %s", (c)->shown, (c)->line, PW_PRINTED (300, __VA_ARGS__))
 
-/* ---- Lines and cells ---- */
-
 /* Characters that end a cell; several blanks are one separator. */
 static const char *const columns_separators[] = { "\t\n", ";\n", ",\n", " \t\n" };
 
-/* Blanks before a cell. */
 static const char *columns_blanks (const char *separator) {
   return *separator == ' ' ? " \t" : " ";
 }
@@ -149,8 +146,6 @@ static int columns_split (columns *c, const char *line) {
   }
 }
 
-/* ---- Selection of columns ---- */
-
 /* Finds a column from its number, or its name, with or without unit, if the first line names the columns (named: 1). */
 static int columns_find (const columns *c, int named, const char *name, int *index) {
   char cell[COLUMNS_CELL], unit[100], *end;
@@ -191,8 +186,6 @@ static int columns_open (const columns *c, int named, const char *name, const ch
   if (!named || pw_unit_check (cell, unit, &source->factor, reason, sizeof reason) == PW_OK) return PW_OK;
   return columns_fail (c, "%s", reason);
 }
-
-/* ---- Numbers ---- */
 
 /* A table has either decimal commas or decimal points; where both occur, some separate thousands. */
 static int columns_check_decimals (columns *c, const char *cell, int is_comma, columns_source source) {
@@ -415,7 +408,6 @@ typedef struct {
 
 static int units_read (const char *text, units_value *u);
 
-/* Multiplies *u by a power of the unit whose name has n bytes. */
 static int units_multiply (const char *name, size_t n, int power, units_value *u) {
   units_value one = { .factor = 1 };
   const pw_unit_name *unit = pw_unit_names;

@@ -9,8 +9,6 @@
 #include <unistd.h>
 #include "files.h"
 
-/* ---- Reading ---- */
-
 const char *pw_not_regular (mode_t mode) {
   return S_ISDIR (mode)    ? "it is a directory, not a regular file"
          : S_ISFIFO (mode) ? "it is a FIFO or pipe, not a regular file"
@@ -47,8 +45,6 @@ int pw_read_file (const char *failure, const char *path, size_t max_bytes, const
   fclose (f);
   return status;
 }
-
-/* ---- Locations ---- */
 
 /* The location of an existing or future file, links followed. */
 typedef struct {
@@ -110,8 +106,6 @@ static int locate (location *p, const char *path) {
   }
   return ELOOP;
 }
-
-/* ---- Files that a command reads and writes ---- */
 
 typedef struct {
   const pw_use *use;
@@ -518,8 +512,6 @@ int pw_output_finish (pw_output *o, pw_error *error) {
   return pw_output_finish_all (&o, 1, error);
 }
 
-/* ---- Continuation of an interrupted run ---- */
-
 enum { OUTPUT_CHECKED = 65536 }; /* bytes */
 /* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter or
  * cannot be read. */
@@ -598,8 +590,6 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
   output_free (o);
   return NULL;
 }
-
-/* ---- Checkpoints ---- */
 
 static unsigned long long checkpoint_sum (const char *head, size_t head_size, const void *state, size_t state_size) {
   return pw_check_sum (pw_check_sum (PW_CHECK, head, head_size), state, state_size);

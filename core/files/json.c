@@ -4,8 +4,6 @@
 #include <string.h>
 #include "files.h"
 
-/* ---- Items ---- */
-
 /* Before an item or the end of a container: a new line, indented by depth, or the text used within a line. */
 static void json_separator (pw_json *j, int depth, const char *within_line) {
   if (j->depth <= j->lines || j->line)
@@ -75,8 +73,6 @@ void pw_json_numbers (pw_json *j, const char *key, const double *value, int coun
 void pw_json_flag (pw_json *j, const char *key, int value) {
   if (json_item (j, key)) fputs (value ? "true" : "false", j->f);
 }
-
-/* ---- The final state ---- */
 
 static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
   static const char *const names[] = { "x", "y", "phi", "vx", "vy", "omega" };
@@ -150,8 +146,6 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   const double energy[] = { x->kinetic, x->potential, x->work, x->loss, x->projection, x->balance };
   json_numbers (j, "energy", names, ledger ? energy : NULL, 6);
 }
-
-/* ---- The run ---- */
 
 static void json_events (pw_json *j, const pw_summary *summary, const pw_system *s) {
   pw_json_open (j, "events", '[');

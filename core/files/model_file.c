@@ -69,7 +69,6 @@ static int search_file (const char *const where[SEARCH_FOLDERS], const char *fil
   return status;
 }
 
-/* Finds the pinwheel.h of this library. */
 static int search_header (char path[PW_PATH], pw_error *error) {
   static const char *const where[] = { "include", "../include", "../include/pinwheel",
                                        "include", "../include", "../include/pinwheel" };
@@ -129,7 +128,6 @@ static int search_folder (search *s, const char *folder, pw_error *error) {
   return status;
 }
 
-/* Adds the models in the folders of PINWHEEL_MODELS. */
 static int search_environment (search *s, pw_error *error) {
   const char *list = getenv ("PINWHEEL_MODELS");
   if (list == NULL) return PW_OK;
@@ -172,8 +170,6 @@ static void search_close (search *s) {
   pw_arena_free (&s->arena);
   free (s->found);
 }
-
-/* ---- Compilers, which run without a shell ---- */
 
 extern char **environ;
 
@@ -338,8 +334,6 @@ static int build_file (const char *path, const char *engine, build_user *use, vo
   pthread_sigmask (SIG_SETMASK, &cmd.mask, NULL);
   return status;
 }
-
-/* ---- Models ---- */
 
 struct pw_file {
   char name[PW_PATH], path[PW_PATH]; /* the name without its ending; the path with links resolved */
@@ -635,8 +629,6 @@ void pw_page_close (pw_page *p) {
   free (p->file);
 }
 
-/* ---- Specialised scenes ---- */
-
 int pw_processor_lanes (void) {
 #if defined __x86_64__
   if (__builtin_cpu_supports ("avx512f") && __builtin_cpu_supports ("avx512dq") && __builtin_cpu_supports ("avx512vl"))
@@ -873,7 +865,6 @@ static int code_load_cached (code_job *x) {
   return status == PW_OK ? PW_OK : PW_RETRY;
 }
 
-/* Appends source and checksum to an object, and renames it. */
 static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size;

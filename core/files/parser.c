@@ -18,8 +18,6 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
-/* ---- Names and numbers in a text ---- */
-
 #define DIGITS "0123456789"
 
 static int is_digit (char c) {
@@ -62,7 +60,6 @@ char *pw_number_hint (const char *text, char *buffer, size_t size) {
                    *times ? factor : "");
 }
 
-/* Whether an opening parenthesis follows. */
 static int is_call (const char *after) {
   return after[strspn (after, " \t\r\n")] == '(';
 }
@@ -98,8 +95,6 @@ const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_
   while (p && strchr (name, '.') && is_call (*rest)) p = pw_expression_next_word (rest, name);
   return p;
 }
-
-/* ---- Named numbers ---- */
 
 int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena) {
   if (s->index.slot && room <= s->room) return PW_OK;
@@ -141,8 +136,6 @@ enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
 
 /* What the value of a part depends on; variables other than the time are states. */
 enum { DEPENDS_ON_TIME = 1, DEPENDS_ON_STATES = 2 };
-
-/* ---- Tokens ---- */
 
 typedef struct {
   const char *name;
@@ -225,8 +218,6 @@ static void parser_next (parser *p) {
     p->size = strlen (p->symbol->name);
 }
 
-/* ---- Operations ---- */
-
 static void parser_push (parser *p, int op, int index, double value) {
   if (p->status != PW_OK) return;
   p->stacked += 1 - pw_expression_operands (op);
@@ -278,8 +269,6 @@ static parser_part parser_condition (parser *p, parser_part part) {
   return parser_operation (p, part, 0, PW_OP_UNEQUAL, 0);
 }
 
-/* ---- Operands ---- */
-
 static parser_part parser_choice (parser *p);
 
 /* Whether the recursion may go deeper; the caller counts p->depth down again. */
@@ -289,7 +278,6 @@ static int parser_enter (parser *p) {
   return p->status == PW_OK;
 }
 
-/* Whether a name is a named number or a variable. */
 static int parser_knows (const parser *p, const char *name) {
   int found = p->scope && pw_names_find (&p->scope->index, name) >= 0;
   for (const char *const *v = p->variable; v && *v; v++) found |= strcmp (*v, name) == 0;
@@ -318,7 +306,6 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
   return parser_fail (p, p->at, "this does not belong here");
 }
 
-/* Reports that no operand begins here. */
 static parser_part parser_missing (parser *p) {
   if (p->status != PW_OK) return (parser_part){ 0 };
   if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
@@ -474,8 +461,6 @@ static parser_part parser_operand (parser *p) {
   return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
 
-/* ---- Operators ---- */
-
 static parser_part parser_unary (parser *p) {
   parser_part part = { .from = p->at, .first = p->codes };
   int op = p->symbol ? p->symbol->op : 0;
@@ -520,8 +505,6 @@ static parser_part parser_choice (parser *p) {
   p->depth--;
   return parser_operation (p, part, depends, PW_OP_SELECT, 0);
 }
-
-/* ---- Whole expressions ---- */
 
 static int parser_read (parser *p, const pw_scope *s, const char *const *variable, const char *text,
                         pw_expression_error *error) {
@@ -610,8 +593,6 @@ void pw_formula_close (pw_formula *f) {
   if (f) pw_arena_free (&f->arena);
   free (f);
 }
-
-/* ---- Conditions ---- */
 
 struct pw_condition {
   pw_arena arena;

@@ -100,7 +100,6 @@ static pw_range range_tan (const pw_range *x) {
   return range_rounded (tan (x->lo), tan (x->hi));
 }
 
-/* A function of one argument in its domain. */
 static pw_range range_in_domain (const pw_expression_function *f, const pw_range *x) {
   if (f->of_one == pw_sin) return range_sin (x->lo, x->hi, 0);
   if (f->of_one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
@@ -159,8 +158,6 @@ static pw_range range_hypot (const pw_range *x, const pw_range *y) {
   r.breaks = range_contains (x, 0) && range_contains (y, 0);
   return r;
 }
-
-/* ---- Operations with jumps or kinks ---- */
 
 /* floor, ceil, round: one integer, or a break; includes values just after a jump at an end, in either direction. */
 static pw_range range_integer (int op, const pw_range *x) {
@@ -248,8 +245,6 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
   return r;
 }
 
-/* ---- Functions of paths ---- */
-
 /* At an arc length: x and y change at most as fast as it; a bound of the others is known between two corners alone. */
 static pw_range range_path_at (const pw_expression_code *c, const pw_range *s) {
   const int unbounded = range_unbounded (s);
@@ -259,8 +254,6 @@ static pw_range range_path_at (const pw_expression_code *c, const pw_range *s) {
   r.breaks = unbounded || pw_path_break (c->path, s->lo) <= s->hi, r.nan = unbounded;
   return r;
 }
-
-/* ---- Operations ---- */
 
 /* Operations of one or two operands but min and max; only sign and comparisons consider NaN (range_result). */
 static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {

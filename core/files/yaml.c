@@ -42,7 +42,6 @@ static int reference_entry (pw_reader *r, const pw_node *map) {
   return r->error->status;
 }
 
-/* Reads the reference solution, after bodies and elements. */
 static int read_reference (pw_reader *r) {
   pw_reference_text *t = r->reference;
   int bodies, elements;
@@ -121,8 +120,6 @@ static int build_body (pw_reader *r, const pw_node *node) {
   pw_names_add (&r->bodies, body.name, bodies);
   return pw_add_body (r->model, &body);
 }
-
-/* ---- Elements ---- */
 
 static int build_body_name (const pw_reader *r, const pw_node *node, const char **name) {
   if (pw_yaml_text (r, node, r->label, name) != PW_OK) return r->error->status;
@@ -213,7 +210,6 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   return r->error->status;
 }
 
-/* Finds the element type, the first key. */
 static int build_kind (pw_reader *r, const pw_node *node) {
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
   if (first == NULL || first->type != PW_YAML_SCALAR)
@@ -307,8 +303,6 @@ static int build_state (pw_reader *r, const pw_node *node) {
   r->kind = &pw_kind_state;
   return text ? build_fields (r, name, name, text, node->first) : read_no_memory (r);
 }
-
-/* ---- The head ---- */
 
 /* A default must not depend on other parameters: --set would have to change it, too. */
 static int head_default (const pw_reader *r, const pw_node *node, const char *label, const pw_names *names,
@@ -427,9 +421,6 @@ static int read_head (pw_yaml *y, const pw_reader *r) {
   return r->error->status;
 }
 
-/* ---- The model ---- */
-
-/* Adds the numbers of a map {NAME: NUMBER, ...} to the scope. */
 static int build_let (pw_reader *r, const pw_node *map) {
   const char *name;
   double value;
@@ -487,7 +478,6 @@ static int include_parameters (pw_reader *r, const pw_yaml *file, const pw_node 
   return r->error->status;
 }
 
-/* Builds the lists of an included file in the model. */
 static int include_build (pw_reader *r, pw_yaml *file, const pw_node *set, const char *prefix, const pw_place *place) {
   const pw_reader outer = *r;
   pw_scope scope = { 0 };
@@ -576,8 +566,6 @@ static void build_model (pw_model *m, const void *parameters) {
   free (r.output);
   free (r.definition);
 }
-
-/* ---- The file ---- */
 
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
   pw_yaml *y = calloc (1, sizeof *y);

@@ -60,7 +60,6 @@ static int copy_part_read (pw_copies *c, const pw_node *source, const char **res
   return status;
 }
 
-/* Adds a text with braces to the list. */
 static int copy_text (pw_copies *c, const pw_node *source, pw_node *node) {
   struct pw_copy_text *t = pw_arena_alloc (c->arena, sizeof *t);
   copy_part **to = t ? &t->first : NULL;
@@ -146,8 +145,6 @@ int pw_copies_number (pw_copies *c, const pw_node *node, double *value, pw_expre
   return status;
 }
 
-/* ---- Expressions that are kept as text ---- */
-
 /* What replaces a name, or NULL. */
 static const char *rename_of (const pw_renames *names, const char *name, char to[200]) {
   const pw_copies *c = names->copies;
@@ -176,8 +173,6 @@ const char *pw_yaml_renamed (const pw_renames *names, const char *text, pw_arena
   }
   return copy ? strcpy (end, from), copy : NULL;
 }
-
-/* ---- Included files ---- */
 
 enum { INCLUDE_MOST = 1000 /* files of a model */ };
 
@@ -223,7 +218,6 @@ static int include_append (pw_yaml *y, const char *path, const char *from_model,
 
 static int include_all (pw_yaml *y, const pw_node *root, const level *up, size_t max_bytes, pw_error *error);
 
-/* Reads the file whose name is in a node, and those that it includes. */
 static int include_file (pw_yaml *y, pw_node *node, const level *up, size_t max_bytes, pw_error *error) {
   char path[PW_PATH], from_model[PW_PATH];
   const char *reason, *name = node->text;
@@ -313,8 +307,6 @@ int pw_yaml_tables (const pw_yaml *y, int with_included, pw_yaml_each *each, voi
   }
   return stop;
 }
-
-/* ---- Places of included files ---- */
 
 pw_place pw_place_in (const pw_place *around, const double at[2], double phi) {
   pw_place p = { .at = { at[0], at[1] }, .phi = phi, .cos = 1 };

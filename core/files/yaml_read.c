@@ -3,8 +3,6 @@
 #include <stdlib.h>
 #include "yaml_read.h"
 
-/* ---- Keys and lists ---- */
-
 const char *pw_node_found (const pw_node *node) {
   return node->type == PW_YAML_LIST ? "a list" : node->type == PW_YAML_MAP ? "a map" : "text";
 }
@@ -61,8 +59,6 @@ int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label,
     read_fail (r, node->at, "%s: expected a list of %d %s, found one of %d", label, count, items, node->count);
   return r->error->status;
 }
-
-/* ---- Texts and numbers ---- */
 
 const char *pw_yaml_prefixed (const pw_reader *r, const char *name) {
   char *text = *r->prefix ? pw_arena_alloc (r->arena, strlen (r->prefix) + strlen (name) + 1) : NULL;
@@ -191,8 +187,6 @@ void pw_suggest_bodies (const pw_reader *r, pw_nearest *near) {
   for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
 }
 
-/* ---- Entries of lists, and their copies ---- */
-
 int pw_count_entry (pw_reader *r, const pw_node *node) {
   const size_t room = (size_t)++r->entries;
   if (r->entries > PW_MAX_ENTRIES)
@@ -205,7 +199,6 @@ int pw_count_entry (pw_reader *r, const pw_node *node) {
              : read_no_memory (r);
 }
 
-/* Reads `repeat`, {COUNTER: NUMBER}. */
 static int read_repeat (pw_reader *r, const pw_node *repeat, const char **counter, int *count) {
   const pw_node *map = repeat->next;
   double number = 0;
@@ -234,7 +227,6 @@ static int read_copy (pw_reader *r, const pw_node *entry, read_entry *each) {
   return r->error->status;
 }
 
-/* Calls `each` with the copies of an entry. */
 static int read_copies (pw_reader *r, const pw_node *entry, const pw_node *repeat, read_entry *each) {
   pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat }, *outer = r->copies;
   int count = 0, status;

@@ -157,7 +157,6 @@ static const char *contact_text (pw_reader *r, const char *name) {
   return pw_arena_copy (r->arena, PW_PRINTED (400, format, body, at[0], body, at[1], body));
 }
 
-/* pw_scope.expand */
 static const char *expand_name (void *context, const char *name) {
   pw_reader *r = context;
   int output = pw_names_find (&r->outputs, name);
@@ -583,13 +582,10 @@ int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal) {
   return pw_yaml_number (r, node, r->label, PW_REAL, &signal->constant);
 }
 
-/* ---- Paths ---- */
-
 static void path_free (void *path) {
   pw_path_close (path);
 }
 
-/* Reads the points of a path, and its columns in a file. */
 static int path_points (pw_reader *r, const pw_node *node, const pw_node *points, const pw_node *file,
                         const pw_node *columns, pairs *p) {
   const char *column[2] = { NULL, NULL };
@@ -654,8 +650,6 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
   r->reference->paths++;
   return pw_yaml_name_path (r, r->scope, r->prefix, text->name, path);
 }
-
-/* ---- Outlines of bodies ---- */
 
 enum { OUTLINE_MAX_BYTES = 16 << 20 };
 
@@ -728,8 +722,6 @@ int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body) {
   body->outline = (const double (*)[2])corner, body->corners = p.count;
   return PW_OK;
 }
-
-/* ---- Outputs ---- */
 
 int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit) {
   const char *at;

@@ -46,8 +46,6 @@ static unsigned tree_event_offset (tree *x, struct fy_event *e) {
   return mark && mark->line >= 0 ? tree_offset_of (x, mark) : x->at;
 }
 
-/* ---- Nodes ---- */
-
 static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at) {
   pw_node *n = pw_arena_alloc (&x->y->arena, sizeof *n);
   if (n == NULL) return pw_yaml_no_memory (x->y, x->error), NULL;
@@ -108,7 +106,6 @@ static void tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
   x->tail[x->depth++] = &n->first;
 }
 
-/* Refuses aliases, anchors and tags. */
 static int tree_refuse_anchor (tree *x, struct fy_event *e) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
@@ -160,8 +157,6 @@ static void tree_event (tree *x, struct fy_event *e) {
   if (e->type == FYET_MAPPING_END) x->open[x->depth - 1]->count /= 2;
   if (e->type == FYET_MAPPING_END || e->type == FYET_SEQUENCE_END) x->depth--;
 }
-
-/* ---- Syntax ---- */
 
 /* A hint for a frequent mistake, from the line and the message of libfyaml, or "". */
 static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) {

@@ -127,7 +127,6 @@ static int data_read_columns (pw_fit *fit, pw_error *error) {
   return status;
 }
 
-/* The number of columns that are values along the run. */
 static int data_along (const pw_fit *fit) {
   int count = 0;
   for (int i = 0; i < fit->columns; i++) count += fit->column_kind[i] == FIT_ALONG;
@@ -185,7 +184,6 @@ static int data_check_times (const pw_fit *fit, pw_error *error) {
   return PW_OK;
 }
 
-/* Reports which part of the run the data cover, and what is not used. */
 static void data_report (const pw_fit *fit) {
   const double t_end = fit->t_end, covered = fmin (fit->last, t_end) - fit->first;
   int empty = 0;
@@ -214,12 +212,10 @@ static int data_convert_times (pw_fit *fit, double *table, const unsigned char *
   return PW_OK;
 }
 
-/* Whether column j of the table has data along the run. */
 static int data_is_along (const pw_fit *fit, int j) {
   return j > 0 && j <= fit->columns && fit->column_kind[j - 1] == FIT_ALONG;
 }
 
-/* Whether row i of the table has a datum along the run. */
 static int data_row_is_along (const pw_fit *fit, const double *table, int i) {
   int found = 0;
   for (int j = 1; j <= fit->columns; j++) found |= data_is_along (fit, j) && !isnan (table[j * fit->rows + i]);
@@ -433,8 +429,6 @@ static double solve_start (const pw_unknown *unknown, double value) {
   return isfinite (unknown->low) ? sqrt ((1 + part) * (1 + part) - 1) : value / unknown->scale;
 }
 
-/* ---- Residuals ---- */
-
 /* Ends the fit if memory is short, after Ctrl-C, or if what failed is `essential`: no search can do without it. */
 static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
   if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
@@ -507,9 +501,6 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
   return GSL_SUCCESS;
 }
 
-/* ---- Minimum ---- */
-
-/* Makes the last run the result. */
 static void solve_store (fit_solver *solver, double chi2) {
   pw_fit *fit = solver->fit;
   fit->chi2 = chi2;
@@ -576,7 +567,6 @@ static void solve_search (fit_solver *solver, gsl_multifit_nlinear_workspace *w,
   if (solve_run (solver, u) == PW_OK) solve_keep (solver, end);
 }
 
-/* Searches from all starts. */
 static void solve_searches (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, starts = (size_t)fit->starts;
@@ -600,8 +590,6 @@ static void solve_searches (fit_solver *solver) {
     solver->status = pw_fail (solver->error, PW_METHOD,
                               "no search could be completed; begin nearer to a minimum, by --set or --start");
 }
-
-/* ---- Errors of the estimates ---- */
 
 /* Scales the columns of J to length 1, or to 0 for an unknown without effect. */
 static void solve_scale (pw_fit *fit, gsl_matrix *J) {
@@ -664,7 +652,6 @@ static void solve_covariance (pw_fit *fit) {
   }
 }
 
-/* Covariance and standard errors of the estimate. */
 static void solve_errors (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
@@ -680,8 +667,6 @@ static void solve_errors (fit_solver *solver) {
   }
   if (J) gsl_matrix_free (J);
 }
-
-/* ---- The fit ---- */
 
 static int solve_open (fit_solver *solver) {
   pw_fit *fit = solver->fit;
@@ -714,8 +699,6 @@ static int fit_solve (pw_fit *fit, pw_error *error) {
   pw_stop_release ();
   return solver.status;
 }
-
-/* ---- Reports ---- */
 
 enum {
   REPORT_DIGITS = 7,
@@ -759,8 +742,6 @@ static double report_rms (const pw_fit *fit, int column, int *count) {
     if (!isnan (fit->data[k])) sum += pow (fit->fitted[k] - fit->data[k], 2), ++*count;
   return sqrt (sum / *count);
 }
-
-/* ---- Text ---- */
 
 static void report_unknowns (const pw_fit *fit) {
   const char *from = PW_PRINTED (80, "%g %% confidence:  from", 100 * fit->confidence);
@@ -881,9 +862,6 @@ static void fit_print (const pw_fit *fit) {
   if (pw_unknowns_options (&fit->unknowns, fit->estimate, options)) printf ("\n%s\n", options);
 }
 
-/* ---- Files ---- */
-
-/* Writes a matrix, unknowns x unknowns, with these entries. */
 static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
                                 double (*entry) (const pw_fit *fit, int i, int j)) {
   int n = fit->unknowns.count;
@@ -959,8 +937,6 @@ static int fit_table (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- The figure ---- */
-
 /* Data and model of each column along the run, below them the residuals. */
 static int fit_draw (const pw_fit *fit, pw_error *error) {
   const int along = data_along (fit), several = along > 1;
@@ -990,8 +966,6 @@ static int fit_draw (const pw_fit *fit, pw_error *error) {
   }
   return pw_curves_draw (&c, PW_OK, error);
 }
-
-/* ---- The command ---- */
 
 #define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 

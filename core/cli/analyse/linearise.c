@@ -27,8 +27,6 @@ typedef struct {
 
 enum { LINEARISE_COORDINATES = 400 }; /* at most: the cost is cubic */
 
-/* ---- Inputs and outputs ---- */
-
 /* Adds the indices of the names, which end with NULL, each once; `find` returns that of one name. */
 static int linearise_find_all (const pw_system *s, const char **name, int *list, int *count,
                                int (*find) (const pw_system *s, const char *name, pw_error *error), pw_error *error) {
@@ -65,8 +63,6 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
                    PW_NAME (pw_system_signal_name, s, cmd->input[i]));
   return status;
 }
-
-/* ---- The run ---- */
 
 /* Newton's method from the initial state, then from one to which forces lead; the quantities of --hold are held. */
 static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady, pw_error *error) {
@@ -142,8 +138,6 @@ enum {
 
 static const char *const linearise_motions[] = { "steady", "accelerated", "changing" }; /* by pw_steadiness */
 
-/* ---- Eigenvalues ---- */
-
 /* Damping ratio of mode i, the fraction of critical damping; NaN for the eigenvalue 0. */
 static double linearise_damping (const pw_linear *l, int i) {
   double modulus = hypot (l->re[i], l->im[i]);
@@ -155,7 +149,6 @@ static double linearise_doubling_time (double rate) {
   return rate > 0 ? log (2) / rate : NAN;
 }
 
-/* Prints a row for each real eigenvalue and each conjugate pair. */
 static void linearise_print_eigenvalues (const pw_linear *l) {
   static const char *const head[] = { "mode",    "real [1/s]",     "imaginary [1/s]", "frequency [Hz]",
                                       "damping", "doubles in [s]", "halves in [s]",   NULL };
@@ -177,8 +170,6 @@ static void linearise_print_eigenvalues (const pw_linear *l) {
     }
   }
 }
-
-/* ---- Mode shapes ---- */
 
 /* 1 if mode i has a shape: it is no rigid displacement, and its eigenvalue is not 0. */
 static int linearise_has_shape (const pw_linear *l, int i) {
@@ -249,8 +240,6 @@ static void linearise_print (const pw_linearise_command *cmd) {
   if (shown > LINEARISE_MODES) printf ("\nand %d more modes\n", shown - LINEARISE_MODES);
 }
 
-/* ---- Matrices ---- */
-
 /* Entry of [ A B ; C D ], whose rows belong to minimal coordinates, then outputs, and columns to minimal coordinates,
  * then inputs; D = 0. */
 static double linearise_entry (const pw_linearise_command *cmd, int row, int column) {
@@ -275,7 +264,6 @@ static void linearise_blocks (const pw_linearise_command *cmd, linearise_block b
   block[3] = (linearise_block){ "D", n, cmd->outputs, n, cmd->inputs };
 }
 
-/* Writes names and units of the inputs or outputs with the indices of a list. */
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
@@ -440,8 +428,6 @@ static int linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *e
   free (state);
   return error->status;
 }
-
-/* ---- Files ---- */
 
 /* Indices in the list of files of linearise_open_files; 0 is the model. */
 enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };

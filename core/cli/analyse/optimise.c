@@ -76,8 +76,6 @@ enum {
   SEARCH_RESTARTS = 7 /* of SLSQP, at most */
 };
 
-/* ---- Runs ---- */
-
 typedef struct {
   pw_optimise *problem;
   pw_search *search;
@@ -120,14 +118,11 @@ static int search_run (const pw_optimise *problem, const double *unknown, double
   return status;
 }
 
-/* ---- Derivatives ---- */
-
 static int search_neighbour (void *problem, const double *x, double rtol, double *value, pw_error *error) {
   (void)rtol;
   return search_run (problem, x, value, error);
 }
 
-/* Stores the derivatives of the last run in local->slope. */
 static int search_differentiate (local_search *local, pw_error *error) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   const int n = unknowns->count, outputs = local->problem->outputs;
@@ -269,8 +264,6 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
   }
 }
 
-/* ---- Searches ---- */
-
 /* Opens the optimiser with the bounds and these first and last steps of scaled unknowns.  SLSQP uses derivatives.
  * Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a single unknown, as SBPLX
  * does. */
@@ -410,11 +403,8 @@ static int search_effect (void *context, int i, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- All searches ---- */
-
 #define REPORT_SAME 0.01 /* largest distance of results of the same optimum, in scales of the unknowns */
 
-/* Allocates all searches, and sets the first points of those from the starts. */
 static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
                starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
@@ -457,7 +447,6 @@ static int optimise_same (const pw_optimise *problem, const pw_search *a, const 
   return same;
 }
 
-/* Refines the best of the distinct results. */
 static int optimise_refine (pw_optimise *problem, pw_error *error) {
   const pw_search *best;
   unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: its result, or the same optimum, is refined */
@@ -514,8 +503,6 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
   }
   return status;
 }
-
-/* ---- Reports ---- */
 
 enum {
   REPORT_DIGITS = 9,
@@ -602,8 +589,6 @@ static void optimise_print (const pw_optimise *problem) {
   if (pw_unknowns_options (&problem->unknowns, problem->best->to, options)) printf ("\n%s\n", options);
 }
 
-/* ---- JSON ---- */
-
 static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
@@ -678,8 +663,6 @@ static void optimise_yaml (const pw_optimise *problem, FILE *f) {
     }
 }
 
-/* ---- The figure ---- */
-
 /* The objective of every run against each unknown, the best one marked. */
 static int optimise_draw (const pw_optimise *problem, pw_error *error) {
   static const char *const style[] = { "infeasible", "feasible" };
@@ -706,8 +689,6 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
   }
   return pw_curves_draw (&c, PW_OK, error);
 }
-
-/* ---- Before the search ---- */
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
@@ -782,8 +763,6 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
   if (status == PW_OK) status = pw_files_open (&problem->line, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;
 }
-
-/* ---- After the search ---- */
 
 /* The error if no run satisfies the constraints: that of the first run if every run failed. */
 static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {

@@ -39,8 +39,6 @@ enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motio
 static const int periodic_settling[] = { 0, 10, 100 };
 _Static_assert(sizeof periodic_settling / sizeof *periodic_settling == PW_PERIODIC_ATTEMPTS, "one for each attempt");
 
-/* ---- Options ---- */
-
 static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
   double periods = 1;
   cmd->settings.free = cmd->period_text && strcmp (cmd->period_text, "free") == 0;
@@ -87,8 +85,6 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- The search ---- */
-
 static int periodic_set_stopped (pw_periodic_command *cmd) {
   return cmd->stopped |= pw_limit_over (&cmd->limit) != 0;
 }
@@ -125,7 +121,6 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   return status;
 }
 
-/* The error if no attempt succeeded. */
 static int periodic_fail (pw_periodic_command *cmd, pw_error *error) {
   char period[60] = "a free period", tried[200] = "";
   pw_error ignored = { 0 };
@@ -148,7 +143,6 @@ static int periodic_fail (pw_periodic_command *cmd, pw_error *error) {
                          : ", or add losses if the motion grows in every period, as that of a vehicle without any");
 }
 
-/* Follows the branch from the first to the last value of the range, and adds its points. */
 static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   pw_periodic_orbit o;
   pw_progress progress = { .title = NULL };
@@ -166,8 +160,6 @@ static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Reports ---- */
-
 enum {
   PERIODIC_MOST = 12,     /* multipliers in the text, at most */
   PERIODIC_POINTS = 12,   /* of a branch that are not events, in the text, about */
@@ -181,8 +173,6 @@ enum {
 
 /* The names of pw_periodic_event; PW_PERIODIC_END has none: it is not stored. */
 static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
-
-/* ---- Quantities ---- */
 
 /* Displacement of the first body in one period [m]: along its initial x axis, to the left of that, and in total. */
 typedef struct {
@@ -219,8 +209,6 @@ static const char *periodic_rotation_name (const pw_system *s, int i, char *text
   const int bodies = pw_system_bodies (s);
   return i < bodies ? pw_system_body_name (s, i) : pw_system_state_name (s, i + 2 * bodies, text, size);
 }
-
-/* ---- Text ---- */
 
 static void periodic_print_rotations (const pw_system *s, const pw_periodic_orbit *o) {
   char text[PW_NAME_BYTES];
@@ -322,8 +310,6 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
     printf ("\nThe branch ends at %s = %.9g: %s\n", cmd->vary.name, last, pw_periodic_reason (cmd->search));
 }
 
-/* ---- JSON ---- */
-
 static void periodic_json (const void *context, pw_json *j) {
   const pw_periodic_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
@@ -352,8 +338,6 @@ static void periodic_json (const void *context, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-/* ---- The table ---- */
-
 static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   const pw_periodic_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
@@ -378,8 +362,6 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   }
   return status;
 }
-
-/* ---- The figure ---- */
 
 /* Stores x, y, phi, omega of the bodies drawn at PERIODIC_SAMPLES + 1 times of one period, one row for each. */
 static int periodic_sample (const pw_periodic_command *cmd, int bodies, double *row, pw_error *error) {
@@ -504,8 +486,6 @@ static int periodic_draw (const pw_periodic_command *cmd, pw_error *error) {
   periodic_draw_multipliers (cmd, &c, range);
   return pw_curves_draw (&c, status, error);
 }
-
-/* ---- The command ---- */
 
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;

@@ -39,8 +39,6 @@ typedef struct {
 static const double SENSITIVITY_RTOL = 1e-12, /* of the runs that are compared */
     SENSITIVITY_PROBE = 1e-5;                 /* change that shows what an unknown changes, relative to its size */
 
-/* ---- What can be differentiated ---- */
-
 /* Opens the neighbours on both sides.  Refuses a parameter that changes the number of bodies or elements, and an
  * initial value that the constraints determine: making a neighbour consistent moves it by more than 1 % of the step.  A
  * neighbour that cannot be opened is no error here: the differences use the other side. */
@@ -83,8 +81,6 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
   free (x);
   return status;
 }
-
-/* ---- Derivatives ---- */
 
 /* pw_difference_settings.evaluate: the outputs, then the table, as one array. */
 static int sensitivity_evaluate (void *context, const double *x, double rtol, double *value, pw_error *error) {
@@ -171,8 +167,6 @@ static const pw_derivative *sensitivity_of (const sensitivity *cmd, int output, 
   const pw_derivative *of = cmd->derivative + unknown * count * (1 + rows);
   return of + (row < 0 ? output : count + output * rows + row);
 }
-
-/* ---- Text ---- */
 
 /* The unit of a derivative, "m per kg"; "" if it has none, or the output is a formula, whose unit is unknown. */
 static const char *sensitivity_unit (const sensitivity *cmd, int output, int unknown, char unit[SENSITIVITY_UNIT]) {
@@ -262,8 +256,6 @@ static void sensitivity_warn (const sensitivity *cmd) {
   if (used) pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
 }
 
-/* ---- Files ---- */
-
 static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
   char unit[SENSITIVITY_UNIT], reason[500];
@@ -343,8 +335,6 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   }
   return pw_curves_draw (&c, PW_OK, error);
 }
-
-/* ---- The command ---- */
 
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   double every = 0;

@@ -45,8 +45,6 @@ typedef struct {
 /* Directions of pw_steady_follow: towards the first or the last value of the range. */
 enum { TO_FIRST = -1, TO_LAST = 1 };
 
-/* ---- What is held and varied ---- */
-
 /* Reads --vary NAME=LOW:HIGH: NAME is a parameter of the model, or a quantity that is held at the varied value. */
 static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
   if (pw_vary_read (&cmd->vary, &cmd->line, cmd->vary_text, error) != PW_OK) return PW_INPUT;
@@ -88,8 +86,6 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   return status;
 }
 
-/* ---- Points ---- */
-
 static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   size_t coordinates = (size_t)pw_system_coordinates (cmd->line.m.system), n = (size_t)m->linear->unknowns;
   int status = pw_grow (&cmd->point, (size_t)cmd->points, &cmd->room, sizeof *cmd->point);
@@ -114,7 +110,6 @@ static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error 
                   status == PW_RESOURCE ? "out of memory" : "the family of the steady motion cannot be determined");
 }
 
-/* Removes all points but the first `kept`. */
 static void steady_forget (pw_steady_command *cmd, int kept) {
   if (!cmd->vary_text) cmd->branches -= cmd->points - kept;
   while (cmd->points > kept) free (cmd->point[--cmd->points].state);
@@ -128,8 +123,6 @@ static int steady_same (const pw_steady_command *cmd, const pw_steady_motion *a,
 static int steady_is_stopped (pw_steady_command *cmd) {
   return cmd->stopped |= pw_limit_over (&cmd->limit) != 0;
 }
-
-/* ---- The search ---- */
 
 /* Adds a solution unless it is known or not steady; only one of those in families of the same dimension and stability.
  * Its advice: the options --hold which, besides those given, select it within its family. */
@@ -205,8 +198,6 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
                   pw_file_name (cmd->line.m.file), initial, random, reason);
 }
 
-/* ---- Branches ---- */
-
 /* Removes a branch that has no direction where it should begin, since the motion is one of a family there. */
 static int steady_omit (pw_steady_command *cmd, const pw_steady_motion *m, pw_error *error) {
   cmd->branches--;
@@ -245,7 +236,6 @@ static int steady_follow (pw_steady_command *cmd, const pw_steady_point *from, i
   return PW_OK;
 }
 
-/* Whether a motion is one of the points from number `first` on. */
 static int steady_is_known (const pw_steady_command *cmd, const pw_steady_motion *m, int first) {
   int known = 0;
   for (int k = first; k < cmd->points; k++) known |= steady_same (cmd, &cmd->point[k].motion, m);
@@ -313,8 +303,6 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   return cmd->search ? PW_OK : error->status;
 }
 
-/* ---- Reports ---- */
-
 enum {
   STEADY_DIGITS = 6,         /* of numbers in the text */
   STEADY_SHOWN = 12,         /* motions in the text, at most */
@@ -325,8 +313,6 @@ enum {
 
 /* By pw_steady_event, without PW_STEADY_END, which is not stored. */
 static const char *const steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
-
-/* ---- Text ---- */
 
 static void steady_cell (pw_table *t, double value) {
   pw_cell_number (t, 12, pw_rounded (value, STEADY_SMALL), STEADY_DIGITS);
@@ -370,7 +356,6 @@ static void steady_print_motions (const pw_steady_command *cmd) {
   if (cmd->points > STEADY_SHOWN) printf ("  and %d more, see -o DIR\n", cmd->points - STEADY_SHOWN);
 }
 
-/* Prints a row for the ends of each branch and for each of the first events. */
 static void steady_print_branches (const pw_steady_command *cmd) {
   int events = 0;
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
@@ -426,8 +411,6 @@ static void steady_print (const pw_steady_command *cmd) {
               cmd->point[i].advice);
 }
 
-/* ---- JSON ---- */
-
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
   pw_json_print (j, "{schema: %d, model: %s, parameter: %s, unit: %s, held: {", 1, pw_file_name (cmd->line.m.file),
@@ -458,9 +441,6 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-/* ---- The table ---- */
-
-/* The largest number of eigenvalues of a point. */
 static int steady_most_eigenvalues (const pw_steady_command *cmd) {
   int most = 0;
   for (int i = 0; i < cmd->points; i++)
@@ -492,8 +472,6 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   }
   return status;
 }
-
-/* ---- The figure ---- */
 
 enum { REAL, IMAGINARY }; /* parts of an eigenvalue */
 
@@ -584,8 +562,6 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
       if (!p->linear.rigid[i]) pw_curves_point (&c, p->linear.re[i], p->linear.im[i], p->motion.parameter);
   return pw_curves_draw (&c, PW_OK, error);
 }
-
-/* ---- The command ---- */
 
 /* Finds steady motions of the model; with --vary branches that begin at the ends of the range or, if there are none,
  * at the value of the model or within the range. */

@@ -7,7 +7,6 @@
 #include <string.h>
 #include "unknowns.h"
 
-/* Finds the parameter or state of this name in an open model, and its value there. */
 static int unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
   *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1, .high = INFINITY };
   snprintf (u->name, sizeof u->name, "%s", name);
@@ -27,8 +26,6 @@ static int unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name,
   snprintf (u->unit, sizeof u->unit, "%s", pw_system_state_unit (m->system, u->state));
   return PW_OK;
 }
-
-/* ---- Options ---- */
 
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error) {
   const pw_method *method;
@@ -61,8 +58,6 @@ void pw_unknowns_close (pw_unknowns *u) {
   free (u->list);
   pw_cli_engine_close (&u->engine);
 }
-
-/* ---- Unknowns of --free ---- */
 
 static int unknown_read_bounds (pw_unknown *u, const char *text, pw_error *error) {
   pw_range bounds;
@@ -111,8 +106,6 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
   return status;
 }
 
-/* ---- Unknowns of --by ---- */
-
 int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error) {
   while (list[u->count]) u->count++;
   u->list = calloc ((size_t)u->count, sizeof *u->list);
@@ -138,8 +131,6 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
   pw_run_close (r);
   return status;
 }
-
-/* ---- Runs ---- */
 
 /* The model with these values of the unknowns, compiled.  Close it by pw_cli_close_model in every case. */
 static int unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
@@ -204,8 +195,6 @@ int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_differe
   return status;
 }
 
-/* ---- Outputs of a run ---- */
-
 int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *value, double *table, pw_error *error) {
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
@@ -228,8 +217,6 @@ int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *v
 double pw_unknowns_noise (const pw_unknowns *u) {
   return pw_cli_adaptive (u->line->methods, u->method) == 1 ? u->settings.rtol : DBL_EPSILON;
 }
-
-/* ---- Starts and results of searches ---- */
 
 /* Stores the points after the first one; a status. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {

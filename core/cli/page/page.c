@@ -28,8 +28,6 @@ typedef struct {
   char method[100];
 } page;
 
-/* ---- Data ---- */
-
 /* Writes a file as base64 (RFC 4648). */
 static void page_file_json (pw_json *j, const pw_page_file *file, char *base64) {
   static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -49,7 +47,6 @@ static int page_has_method (const pw_method *m) {
   return pw_find_name (page_integrators, sizeof *page_integrators, m->name, hint) >= 0;
 }
 
-/* Writes the script, and the call that passes the data to it. */
 static void page_script (FILE *f, const void *context) {
   const page *cmd = context;
   const pw_system *s = cmd->line.m.system;
@@ -84,8 +81,6 @@ static void page_script (FILE *f, const void *context) {
   fputs (");\n", f);
 }
 
-/* ---- The command ---- */
-
 /* Chooses the method of --method; without it that of the model, unless the engine lacks it, or it has options, or fixed
  * steps although no --step is given. */
 static int page_choose_method (page *cmd, pw_error *error) {
@@ -107,7 +102,6 @@ static int page_choose_method (page *cmd, pw_error *error) {
   return PW_OK;
 }
 
-/* Checks a word of a preset's settings, NAME=VALUE. */
 static int page_check_word (const page *cmd, char *word, pw_error *error) {
   static const char *const setting[] = { "step", "rtol", "t_end", NULL };
   const pw_method *m;

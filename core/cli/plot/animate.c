@@ -81,8 +81,6 @@ void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   pw_json_close (j, ']');
 }
 
-/* ---- The run ---- */
-
 /* `count` numbers of each sample from `offset` on, sample by sample. */
 static void page_samples (pw_json *j, const pw_plots *plots, const char *key, int offset, int count, int digits) {
   if (count == 0) return;
@@ -119,8 +117,6 @@ void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const
   if (plots->with_forces) page_samples (&j, plots, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
   pw_json_close (&j, '}');
 }
-
-/* ---- The page ---- */
 
 void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *f, const void *context),
                         const void *context) {

@@ -13,8 +13,6 @@ int pw_plot_rolls (const pw_plots *plots, int wheel) {
   return pw_kind_acts (pw_system_element (plots->system, plots->wheels.system_index[wheel]).kind);
 }
 
-/* ---- Opening ---- */
-
 /* A zeroed array; NULL, with plots->out_of_memory set. */
 static void *plot_array (pw_plots *plots, int count, size_t size) {
   void *array = pw_arena_alloc (&plots->arena, (size_t)count * size);
@@ -22,7 +20,6 @@ static void *plot_array (pw_plots *plots, int count, size_t size) {
   return array;
 }
 
-/* Makes room for the numbers of tracks in a sample. */
 static void plot_open_tracks (pw_plots *plots, pw_tracks *tracks, int count) {
   tracks->count = count;
   tracks->drawn = count < PLOT_DRAWN ? count : PLOT_DRAWN;
@@ -132,8 +129,6 @@ void pw_plots_close (pw_plots *plots) {
   free (plots);
 }
 
-/* ---- Samples ---- */
-
 double pw_plots_next (const pw_plots *plots) {
   if (plots->samples == plots->planned) return INFINITY;
   return plots->samples + 1 == plots->planned ? plots->t_end : plots->t_end * plots->samples / (plots->planned - 1);
@@ -233,8 +228,6 @@ static int data_closeup (const pw_plots *plots) {
   while (n < plots->samples && pw_plot_extend (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;
   return n < FIGURES_CLOSEUP ? 0 : n;
 }
-
-/* ---- Files ---- */
 
 /* One block per curve: time, the numbers of the body or wheel, its number among all of them, from 1. */
 static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error *error) {
@@ -406,9 +399,6 @@ static int data_paths (const pw_plots *plots, pw_error *error) {
   return pw_output_finish (o, error);
 }
 
-/* ---- Scripts ---- */
-
-/* Writes the script of the paths or of the mechanism: values of the template's variables. */
 static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
   const int mechanism = strcmp (name, "mechanism") == 0;
   pw_output *o = pw_figure_begin (&plots->figures, name, error);
@@ -443,8 +433,6 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   return pw_figure_end (o, name, error);
 }
 
-/* ---- Curves over time ---- */
-
 int pw_plot_marked (const pw_plots *plots, int row, int *end) {
   const int rows = pw_system_rows (plots->system);
   for (; row < rows; row = *end) {
@@ -470,7 +458,6 @@ static void figures_panel (pw_curves *c, const pw_plots *plots, const char *labe
                                    .type = from == 0 ? PW_PANEL_BELOW : 0 });
 }
 
-/* Marks the events in the panel. */
 static void figures_events (pw_curves *c, const pw_plots *plots) {
   for (int end, row = 0; (row = pw_plot_marked (plots, row, &end)) >= 0; row = end) {
     pw_curves_add (c, "event", PW_NAME (pw_system_row_name, plots->system, row));
@@ -479,7 +466,6 @@ static void figures_events (pw_curves *c, const pw_plots *plots) {
   }
 }
 
-/* A curve of the number at this place of the samples. */
 static void figures_curve (pw_curves *c, const pw_plots *plots, const char *label, int place, int number) {
   pw_curves_add (c, number ? "graded" : "line", label);
   for (int i = 0; i < plots->samples; i++)

@@ -8,14 +8,11 @@
 /* The unit of symbols, relative to the size of the mechanism or, if that is less, 4 times the reach of its bodies. */
 #define SHAPES_UNIT 0.035
 
-/* ---- Outlines ---- */
-
 /* Twice the area of the triangle a b c, positive if they turn to the left. */
 static double shapes_doubled_area (const double *a, const double *b, const double *c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Points by x, then y, for qsort. */
 static int shapes_order (const void *a, const void *b) {
   const double *p = a, *q = b;
   return p[0] != q[0] ? (p[0] > q[0]) - (p[0] < q[0]) : (p[1] > q[1]) - (p[1] < q[1]);
@@ -94,8 +91,6 @@ static void shapes_add_discs (pw_plots *plots, const pw_element *e, const int *b
     if (!known) plots->disc[plots->discs++] = disc;
   }
 }
-
-/* ---- Links ---- */
 
 /* Adds an end at the joint of two bodies, the first one's end of an earlier link between them; 0 if there is none. */
 static int shapes_add_joint (const pw_plots *plots, int first, int second, pw_plot_link *link) {
@@ -210,8 +205,6 @@ void pw_plot_forces (const pw_plots *plots, const pw_sample *sample, double *out
   }
 }
 
-/* ---- Sizes ---- */
-
 void pw_plot_point (const double *placement, const double *at, double out[2]) {
   double c = cos (placement[2]), s = sin (placement[2]);
   out[0] = placement[0] + c * at[0] - s * at[1];
@@ -231,7 +224,6 @@ void pw_plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *disc
   out[2] = placement[2];
 }
 
-/* Extends a box by the discs of the ground, or by those of bodies at sample i. */
 static void box_extend_discs (pw_plot_box *box, const pw_plots *plots, int i, int ground) {
   for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
     double at[3], r = disc->at[2];
@@ -444,8 +436,6 @@ static int symbol_next (const pw_plot_link *link, double u, symbol_rail rail, co
   *strokes = drawn && stroke->vertices > 0;
   return 1;
 }
-
-/* ---- In the inertial frame ---- */
 
 /* The frame of a symbol, as in pw_plot_stroke. */
 typedef struct {

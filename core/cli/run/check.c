@@ -68,8 +68,6 @@ PW_PRINTF (2, 3) static void check_add (pw_check_list *list, const char *format,
   va_end (arguments);
 }
 
-/* ---- Initial conditions ---- */
-
 /* Initial values specified by the model or given by the user that were changed by more than rounding. */
 static void check_given_values (pw_check *check) {
   const pw_system *s = check->line.m.system;
@@ -105,8 +103,6 @@ static int check_reference (pw_check *check, pw_error *error) {
   return status;
 }
 
-/* ---- Element types ---- */
-
 /* The first check that fails, or NULL. */
 static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
   for (int i = 0; i < report->checks; i++)
@@ -136,8 +132,6 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
                fault->where);
   return status;
 }
-
-/* ---- Limits of reactions ---- */
 
 enum { CHECK_LIMIT_OUTPUTS = 4, CHECK_LIMIT_SECONDS = 10 /* of processor time */ };
 
@@ -189,8 +183,6 @@ static int check_limits (pw_check *check, pw_error *error) {
   return own.status == PW_RESOURCE ? pw_fail (error, own.status, "%s", own.text) : status;
 }
 
-/* ---- Wheels ---- */
-
 /* Wheels roll in the plane of the model.  Seen from above, no gravity acts in it, and on a slope of angle a that of
  * g sin (a), which is below CHECK_SLOPE up to 45 degrees. */
 static const double CHECK_SLOPE = 7; /* m/s^2 */
@@ -216,8 +208,6 @@ static void check_wheels (pw_check *check) {
   if (check->run && linear->positions > 0 && linear->velocities == 0 && !prescribed)
     check_add (&check->finding, "the wheels allow no motion; wheels that slip sideways are of type tyre");
 }
-
-/* ---- Linearisation ---- */
 
 static int check_linear (pw_check *check, pw_error *error) {
   pw_error own = { 0 };
@@ -302,8 +292,6 @@ static void report_end_list (pw_json *j, int listed) {
   if (listed > REPORT_LISTED) report_print (j, "    and %d more\n", listed - REPORT_LISTED);
 }
 
-/* ---- Mobility and mass ---- */
-
 /* Why results of the linearisation are missing. */
 static const char *report_why_not_computed (const pw_linear *linear) {
   static char text[80];
@@ -378,8 +366,6 @@ static void report_mass (pw_json *j, const pw_check *check) {
   pw_json_text (j, "saddle_point", condition);
 }
 
-/* ---- Initial conditions ---- */
-
 static void report_initial (pw_json *j, const pw_check *check) {
   static const char title[] = "Initial conditions";
   int listed = 0, n = pw_system_coordinates (check->line.m.system);
@@ -412,7 +398,6 @@ static void report_initial (pw_json *j, const pw_check *check) {
                   PW_COUNTED (check->reference_states, "state"));
 }
 
-/* The outputs at the initial state. */
 static void report_outputs (pw_json *j, const pw_check *check) {
   const pw_system *s = check->line.m.system;
   pw_sample sample;
@@ -425,8 +410,6 @@ static void report_outputs (pw_json *j, const pw_check *check) {
   pw_json_close (j, '}');
 }
 
-/* ---- Element types ---- */
-
 /* The checks that failed, in `scenes`: "random scenes" or "this model". */
 static void report_failures (pw_json *j, const pw_selftest_report *report, const char *scenes) {
   for (const pw_selftest_check *c = report->check; c < report->check + report->checks; c++) {
@@ -438,9 +421,6 @@ static void report_failures (pw_json *j, const pw_selftest_report *report, const
   }
 }
 
-/* ---- Linearisation ---- */
-
-/* An eigenvalue, or a conjugate pair. */
 static char *report_eigenvalue (const pw_linear *linear, int i, char buffer[100]) {
   snprintf (buffer, 100, linear->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", PW_DIGITS (linear->re[i], CHECK_DIGITS),
             PW_DIGITS (fabs (linear->im[i]), CHECK_DIGITS));
@@ -608,8 +588,6 @@ static void report_write (const pw_check *check, pw_json *j) {
   if (check->problem.count + check->finding.count == 0) report_print (j, "\nNo problems found\n");
   if (j == NULL) report_lists (j, check);
 }
-
-/* ---- The command ---- */
 
 static int check_model (pw_check *check, pw_error *error) {
   const pw_system *s = check->line.m.system;

@@ -112,7 +112,6 @@ typedef struct {
   pw_motion *motion;
 } sampler;
 
-/* Stores the samples up to the time reached. */
 static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   pw_motion *motion = ((sampler *)visitor)->motion;
   pw_sample sample;
@@ -534,8 +533,6 @@ static void conclusion_print (const pw_compare *compare) {
   if (before != beginning) putchar ('\n');
 }
 
-/* ---- The rows ---- */
-
 enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
 #define COMPARE_FEW 3          /* timed runs of a row that suffice if their times agree or are long */
 #define COMPARE_FEWEST 2       /* those that suffice if their times agree and are long */
@@ -583,7 +580,6 @@ static double compare_level (compare_ladder ladder, int adaptive, int i) {
 /* All rows are one group; those of a method are a curve, with a point each. */
 enum { COMPARE_GROUP = 0, COMPARE_POINTS = 1 };
 
-/* Adds a row for each level of each method. */
 static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], pw_error *error) {
   for (int i = 0; i < study->methods; i++) {
     int adaptive = pw_cli_adaptive (study->line.methods, study->method[i]);
@@ -618,8 +614,6 @@ static int compare_plan (pw_study *study, pw_error *error) {
   compare->finest_step = ladders[0].to;
   return status == PW_OK ? compare_plan_rows (study, ladders, error) : status;
 }
-
-/* ---- A row ---- */
 
 /* Errors below the uncertainty of the reference are replaced by it, and marked. */
 static void compare_set_errors (const pw_compare *compare, const pw_motion *motion, pw_row *row) {
@@ -730,8 +724,6 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   if (row->state == ROW_DONE) memcpy (row->point, point, sizeof point);
   return status;
 }
-
-/* ---- The command ---- */
 
 static int compare_begin (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;

@@ -30,8 +30,6 @@ typedef struct {
   pw_axis axis[DRIFT_OPTIONS]; /* values of the options */
 } pw_drift;
 
-/* ---- Columns ---- */
-
 /* Indices in drift_columns: COLUMN_ALPHA + an option; COLUMN_QUANTITY: the first value of the first quantity. */
 enum { COLUMN_ALPHA = 2, COLUMN_BETA = COLUMN_ALPHA + DRIFT_BETA, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
 
@@ -63,8 +61,6 @@ static const pw_study_column drift_columns[] = {
   { "factorisations", NULL, "factor.", 9, .format = "%.0f" },
 };
 
-/* ---- Values of options ---- */
-
 /* Reads "OPTION=RANGE". */
 static int drift_read_values (pw_drift *drift, const char *text, pw_error *error) {
   char hint[PW_HINT];
@@ -80,8 +76,6 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
   }
   return status;
 }
-
-/* ---- Rows ---- */
 
 /* Forms the method of a stabilisation with its options and the first integrator of --methods that has `option`, else
  * rk4.  Options given there are kept if they do not belong to a stabilisation. */
@@ -163,8 +157,6 @@ static int drift_plan (pw_study *study, pw_error *error) {
   return status == PW_OK ? drift_plan_rows (drift, error) : status;
 }
 
-/* ---- Runs ---- */
-
 typedef struct {
   pw_visitor base;
   double first_half[DRIFT_QUANTITIES]; /* largest values up to t_end / 2 */
@@ -216,8 +208,6 @@ static int drift_measure (pw_study *study, pw_row *row, pw_error *error) {
   for (int i = 0; i < DRIFT_QUANTITIES; i++) drift_finish (row, i, visitor.first_half[i]);
   return status;
 }
-
-/* ---- The command ---- */
 
 static int drift_begin (pw_study *study, pw_error *error) {
   (void)error;

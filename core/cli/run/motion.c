@@ -110,8 +110,6 @@ void pw_motion_errors (const pw_system *system, const pw_motion *reference, cons
   }
 }
 
-/* ---- References ---- */
-
 #define MOTION_SAME_TIME 1e-9 /* relative to the final time: smaller differences of times are ignored */
 
 /* A table like those of `pinwheel run -o`, in which columns may be missing. */

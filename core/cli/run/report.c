@@ -20,8 +20,6 @@ static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
 }
 
-/* ---- Settings ---- */
-
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings) {
   double step = fmin (settings->step, settings->span), time_scale = pw_run_scale (run)->time;
@@ -42,8 +40,6 @@ void pw_report_settings (pw_run *run, const pw_system *system, const char *metho
         "compare with shorter ones\n",
         PW_DIGITS (step, 3), PW_DIGITS (time_scale, 2));
 }
-
-/* ---- The model ---- */
 
 /* Angles of more than a turn that are multiples of 0.5: most likely they are degrees, not those of a long run. */
 static void report_angle (const char *kind, const char *name, const char *field, double angle) {
@@ -77,8 +73,6 @@ void pw_report_model (const pw_cli_model *m) {
   for (int i = 0; i < elements; i++)
     for (const pw_field *field = element[i].kind->fields; field->name; field++) report_field (&element[i], field);
 }
-
-/* ---- Initialisation ---- */
 
 /* States that the consistent initialisation has changed: values that were specified, and those that were left out. */
 static void report_initial (pw_run *run, const pw_system *system) {
@@ -148,16 +142,12 @@ const char **pw_report_redundancies (pw_run *run) {
   return text;
 }
 
-/* ---- Results ---- */
-
-/* Cells of a name, a number and its unit. */
 static void report_value (pw_table *table, int width, const char *name, double value, const char *unit) {
   pw_cell (table, width, name);
   pw_cell_number (table, REPORT_WIDTH, value, REPORT_DIGITS);
   pw_cell (table, -1, unit);
 }
 
-/* Internal coordinates of elements, and first-order states. */
 static void report_internal (const pw_system *system, const pw_sample *last) {
   int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
   int end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;

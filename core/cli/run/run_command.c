@@ -175,8 +175,6 @@ static int checkpoints_save (pw_run_cli *command, pw_error *error) {
   return status;
 }
 
-/* ---- Before the run ---- */
-
 /* Refuses files used twice.  Called before the model is open, and again after that, for the tables that it reads. */
 static int run_check_paths (pw_run_cli *command, pw_error *error) {
   const pw_checkpoints *checkpoints = &command->checkpoints;
@@ -296,8 +294,6 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   return status == PW_OK ? checkpoints_resume (command, error) : status;
 }
 
-/* ---- The run ---- */
-
 /* The time of the next row [s]: a multiple of the interval, or the end if the two differ by round-off only; 0 if every
  * step has a row; INFINITY without a table. */
 static double run_next_row_time (const pw_run_cli *command) {
@@ -350,7 +346,6 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   return status;
 }
 
-/* Advances to the next sample or checkpoint, the end of the batch, or a request to stop. */
 static int run_batch (pw_run_cli *command, pw_error *error) {
   double due = fmin (command->checkpoints.next_time, command->settings.span);
   due = fmin (due, run_next_row_time (command));
@@ -434,8 +429,6 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   if (status == PW_STOPPED) status = pw_limit_status (&command->limit, pw_run_time (command->run), error);
   return status;
 }
-
-/* ---- After the run ---- */
 
 /* Writes the table to the disk for run_name_files, or keeps its rows as NAME.part; without rows it leaves no file. */
 static void run_close_table (pw_run_cli *command, int complete, pw_error *error) {

@@ -77,8 +77,6 @@ void pw_error_run_close (pw_error_run *e) {
   free (e->rows);
 }
 
-/* ---- The report ---- */
-
 /* Stated errors of the bodies at the end; those of x and y are the error of a length. */
 static void error_bodies (const pw_stated_error *e, const pw_system *s, FILE *f) {
   static const char *const head[] = { "body", "position [m]", "phi [rad]", "velocity [m/s]", "omega [rad/s]", NULL };

@@ -5,8 +5,6 @@
 #include "report.h"
 #include "study.h"
 
-/* ---- Methods ---- */
-
 static int methods_add (pw_study *study, const char *name, pw_error *error) {
   const pw_method *integrator;
   int stabilisation, status = pw_method_parse (name, study->line.methods, &integrator, &stabilisation, error);
@@ -56,7 +54,6 @@ static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error)
                   pw_nearest_text (&near));
 }
 
-/* Adds the methods of a list of patterns, separated by commas. */
 static int methods_add_list (pw_study *study, const char *text, pw_error *error) {
   for (const char *rest = text;; rest++) {
     char pattern[STUDY_NAME];
@@ -76,8 +73,6 @@ int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *err
     status = methods_add_list (study, PW_PRINTED (STUDY_NAME, "%s+all", (*m)->name), error);
   return status;
 }
-
-/* ---- Rows ---- */
 
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
   pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
@@ -107,7 +102,6 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
   pthread_mutex_unlock (&study->mutex);
 }
 
-/* Advances a run to the end. */
 static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
                           pw_error *error) {
   int status = PW_OK;
@@ -180,8 +174,6 @@ int pw_study_record_run (const pw_study *study, pw_row *row, int status, const p
   return PW_OK;
 }
 
-/* ---- The table, on the terminal and in a CSV file ---- */
-
 const char *pw_study_method (const pw_row *row) {
   return row->method;
 }
@@ -248,8 +240,6 @@ static int table_write_row (pw_study *study, const pw_row *row, pw_error *error)
                        error);
 }
 
-/* ---- Figures ---- */
-
 /* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.  A point
  * is defined if its coordinates 1, 2, ... are, which are set together. */
 static const double *table_next_point (const pw_study *study, int group, const pw_row **row, int *point) {
@@ -280,8 +270,6 @@ int pw_study_close_figure (pw_study *study, pw_curves *c, pw_error *error) {
   if (c->panels) study->scripts[script] = c->name;
   return status;
 }
-
-/* ---- The command ---- */
 
 static int study_open_folder (pw_study *study, pw_error *error) {
   const char *const *tables = study->type->table_names;

@@ -66,8 +66,6 @@ typedef struct {
   pw_error error;
 } sweep_row;
 
-/* ---- Specialised code ---- */
-
 /* The code of a text, compiled by the first thread that needs it; `sweep` owns the text from now on.  The caller
  * holds the lock, which is released meanwhile. */
 static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const pw_system *system, pw_error *error) {
@@ -111,9 +109,6 @@ static void rows_specialise (sweep_rows *sweep, row_system *system) {
   if (system->code == NULL && pw_stop) system->error.status = PW_RETRY; /* Ctrl-C ends the compiler, too */
 }
 
-/* ---- Compiled systems ---- */
-
-/* Compiles the system of a row, and finds the states of the table in it. */
 static int system_open (row_system *system, const pw_plan *plan, long row, pw_error *error) {
   char name[PW_NAME_BYTES];
   if (pw_plan_compile (plan, row, &system->model, error) != PW_OK) return error->status;
@@ -160,8 +155,6 @@ static row_system *system_of (sweep_rows *sweep, long row) {
   pthread_cond_broadcast (&sweep->compiled);
   return system;
 }
-
-/* ---- One run ---- */
 
 /* Makes the whole run and its repetition; stores the stated errors of the states at the end if they are known. */
 static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_settings *settings) {
@@ -270,8 +263,6 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (sweep->error->status != PW_OK) pw_stop = 1;
 }
 
-/* ---- Threads ---- */
-
 /* A thread and the rows that it computes at once.  With more than one there are neither --cpu nor --limit: both refer
  * to the processor time of the thread. */
 typedef struct {
@@ -338,7 +329,6 @@ static void worker_advance (sweep_worker *worker) {
   for (int i = 0; i < n; i++) running[i]->status = status[i], running[i]->error = error[i];
 }
 
-/* Computes rows until there are none. */
 static int worker_thread (void *context, int i, pw_error *error) {
   sweep_rows *sweep = context;
   sweep_worker worker = { .sweep = sweep, .lanes_code = pw_scene_code_lanes (sweep->plan->lanes_code), .width = 1 };
@@ -402,8 +392,6 @@ static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_
   return error->status;
 }
 
-/* ---- The command ---- */
-
 typedef struct {
   /* as given */
   pw_cli_line line;
@@ -416,7 +404,6 @@ typedef struct {
   int jobs;
 } pw_sweep;
 
-/* Refuses missing or unsuitable options and arguments. */
 static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
   if (sweep->line.arguments == 0)
     return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel sweep %s",
@@ -503,8 +490,6 @@ static int sweep_open (pw_sweep *sweep, pw_error *error) {
                 sweep->journal.rows);
   return PW_OK;
 }
-
-/* ---- The end ---- */
 
 static void sweep_report_failures (const pw_tally *tally) {
   if (tally->failed > 0)

@@ -12,8 +12,6 @@
 
 enum { PLAN_TRIES = 1000 }; /* failures to build a model after which no other values are tried */
 
-/* ---- Ranges ---- */
-
 static int axis_fail (const pw_axis *axis, const char *why, pw_error *error) {
   return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", axis->name, axis->text, why);
 }
@@ -62,8 +60,6 @@ double pw_axis_value (const pw_axis *axis, long i) {
   if (isfinite (value)) return value;
   return low / last * (last - k) + high / last * k; /* the products were too large */
 }
-
-/* ---- The grid ---- */
 
 double pw_grid_value (const pw_grid *grid, int i, long row) {
   const pw_axis *axis = grid->axis + i;
@@ -115,8 +111,6 @@ static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena,
   return status;
 }
 
-/* ---- Models ---- */
-
 int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
   pw_model *model = pw_file_model (plan->line->m.file, error);
   *compiled = (pw_cli_model){ .model = model };
@@ -131,8 +125,6 @@ int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_e
     if (axis->parameter == NULL && pw_system_find_state (compiled->system, axis->name, error) < 0) return PW_INPUT;
   return PW_OK;
 }
-
-/* ---- Axes ---- */
 
 /* Finds the parameter of an axis, in whose domain all values must lie.  Other names are those of states, which exist
  * only in a compiled model. */
@@ -151,9 +143,6 @@ static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model,
   return PW_OK;
 }
 
-/* ---- Columns ---- */
-
-/* Adds the new states of a system, and the units of varied initial values. */
 static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *error) {
   const int n = pw_system_coordinates (system), bodies = pw_system_bodies (system);
   for (int i = 0; i < 2 * n; i++) {
@@ -270,8 +259,6 @@ static int plan_find_columns (pw_plan *plan, pw_error *error) {
   return pw_fail (error, scan.first_error.status, "%s", scan.first_error.text);
 }
 
-/* ---- Cells ---- */
-
 /* A cell of a row or, if that is NULL, of the heading, which alone uses name and unit. */
 static void plan_cell (const pw_plan_row *row, pw_text *text, const char *name, const char *unit, double value) {
   row ? pw_text_number (text, value) : pw_text_name (text, name, unit);
@@ -313,8 +300,6 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
   row ? pw_text_quoted (text, row->reason) : pw_text_cell (text, "reason");
 }
 
-/* ---- The fingerprint ---- */
-
 static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
   pw_text *text = &plan->fingerprint;
   if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line, plan->tables_sum, plan->method, &plan->settings, error) !=
@@ -347,8 +332,6 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
   if (text->failed || plan->heading.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   return PW_OK;
 }
-
-/* ---- The plan ---- */
 
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   const pw_method *method;
@@ -407,8 +390,6 @@ typedef struct {
   char *begin, *end;
 } journal_map;
 
-/* ---- Lines ---- */
-
 /* FNV-1a (Fowler, Noll, Vo) of a row's number, status and text. */
 static uint32_t journal_line_checksum (long row, int status, const char *text, size_t size) {
   uint32_t h = 2166136261u;
@@ -450,8 +431,6 @@ static void journal_map_close (journal_map *map) {
   if (map->end > map->begin) munmap (map->begin, (size_t)(map->end - map->begin));
   *map = (journal_map){ NULL, NULL };
 }
-
-/* ---- The journal ---- */
 
 /* Appends a text to the journal, all or nothing. */
 static int journal_write (pw_journal *journal, const char *text, size_t size, pw_error *error) {
@@ -555,8 +534,6 @@ void pw_journal_close (pw_journal *journal) {
   *journal = (pw_journal){ .descriptor = -1 };
 }
 
-/* ---- The table of a journal ---- */
-
 /* Reads the line of a row, and counts how its run ended; 0 if it is another line. */
 static int table_read_row (const char *at, const char *end, long row, journal_line *line, pw_tally *tally) {
   if (!journal_line_read (at, end, line) || line->row != row) return 0;
@@ -597,7 +574,6 @@ static int table_cell_of (const pw_plan *plan, int i) {
   return state < 0 ? states - 1 /* t */ : states + state;
 }
 
-/* Stores the numbers of a row that are drawn. */
 static void table_keep (const pw_plan *plan, long row, const char *line) {
   const int count = pw_plan_drawn (plan);
   for (int i = 0; i < count; i++) {
@@ -616,7 +592,6 @@ typedef struct {
   pw_tally *tally;
 } table_source;
 
-/* Writes the table, or the part, of a complete journal. */
 static int table_write (const void *context, FILE *f, pw_error *error) {
   const table_source *x = context;
   const pw_plan *plan = x->plan;
@@ -652,8 +627,6 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
                   journal->path, strerror (errno));
 }
 
-/* ---- The table of all parts ---- */
-
 typedef struct {
   const char *path;
   journal_map map;
@@ -661,7 +634,6 @@ typedef struct {
   int number, parts;                /* part I of N */
 } table_part;
 
-/* Opens a part and finds its number and first row. */
 static int table_open_part (table_part *part, const char *path, pw_error *error) {
   const char *reason;
   char text[40] = "";

@@ -18,8 +18,6 @@
 /* The clock of the browser [ms]; page.js provides it. */
 __attribute__ ((import_module ("page"), import_name ("now"))) double pw_page_now (void);
 
-/* ---- Files ---- */
-
 static pw_page_file *page_file;
 static int page_files;
 static size_t page_room; /* entries of page_file that are allocated */
@@ -65,8 +63,6 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   return pw_yaml_load_tree (y, page_file[i].bytes, page_file[i].size, error);
 }
 
-/* ---- The model ---- */
-
 extern const pw_plugin_table pw_plugin __attribute__ ((weak)); /* of a model in C */
 
 static pw_error page_error;
@@ -87,8 +83,6 @@ PAGE_EXPORT (open) int page_open (const char *name) {
   }
   return page_error.status;
 }
-
-/* ---- A run ---- */
 
 static pw_model *page_model;
 static pw_system *page_system;
@@ -166,8 +160,6 @@ int page_run (const char *method, double step, double rtol, double t_end, double
   return status;
 }
 
-/* ---- One step, as the page shows it ---- */
-
 enum { STAGES = 4 };
 
 /* Adds samples of a step h of rk4 from the state reached: the states of its four stages, then its result. */
@@ -223,8 +215,6 @@ int page_step (double step, double t, double limit, const double *parameter, con
   pw_run_close (r);
   return status;
 }
-
-/* ---- Results ---- */
 
 /* The samples of the run. */
 PAGE_EXPORT (data) const double *page_data (void) {
