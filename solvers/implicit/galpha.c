@@ -54,8 +54,6 @@ static double galpha_e (const pw_method_data *d, double h) {
   return (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
 }
 
-/* ---- Newton's iteration ---- */
-
 static int galpha_update (pw_run *r, double t1) {
   return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), r->data->common.q1, r->data->common.v1);
 }
@@ -167,8 +165,6 @@ static int galpha_solve (pw_run *r, double h, double t1) {
   return PW_RETRY;
 }
 
-/* ---- Opening ---- */
-
 static int galpha_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
@@ -193,8 +189,6 @@ static int galpha_open (pw_run *r, pw_error *error) {
   return pw_implicit_complete (r, status, x->size, projection, error);
 }
 
-/* ---- Initialisation ---- */
-
 /* a-dot at the state reached: a difference quotient over 1e-3 of the step, short enough for stiff forces, long enough
  * for round-off. */
 static int galpha_jerk (pw_run *r, double h, double *jerk) {
@@ -208,28 +202,6 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
                                   d->common.dae.scratch);
   for (int j = 0; j < d->common.dae.n; j++) jerk[j] = (jerk[j] - d->a[j]) / dt;
   return status;
-}
-
-/* 1 if a-dot would change the accelerations by several times their size in a step: the scene has vibrations that are
- * too fast for the step. */
-static int galpha_vibrates (const pw_run *r, double h, const double *jerk) {
-  const pw_method_data *d = r->data;
-  double change = 0, size = 0;
-  for (int j = 0; j < d->common.dae.n; j++) {
-    change += r->s->metric[j] * jerk[j] * jerk[j];
-    size += r->s->metric[j] * d->a[j] * d->a[j];
-  }
-  return h * sqrt (change) > 4 * sqrt (size);
-}
-
-/* a-dot as the change of a in a trial step from w = a, which does not amplify vibrations that the step does not
- * resolve. */
-static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
-  pw_method_data *d = r->data;
-  memcpy (d->w, d->a, (size_t)d->common.dae.n * sizeof *d->w);
-  int status = galpha_solve (r, h, r->t + h);
-  for (int j = 0; j < d->common.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
-  return status > 0 ? PW_OK : status; /* the step itself may still succeed */
 }
 
 /* Adds to the velocities the error with which the method starts without loss of order in index3: the dv with
@@ -249,10 +221,12 @@ static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
   return PW_OK;
 }
 
-/* Initialises d->v, d->a and d->w for the first step of this size. */
+/* Initialises d->v, d->a and d->w for the first step of this size.  If a-dot would change the accelerations by several
+ * times their size in a step, the scene has vibrations that are too fast for it.  Then a-dot is the change of a in a
+ * trial step from w = a, which does not amplify them. */
 static int galpha_begin (pw_run *r, double h) {
   pw_method_data *d = r->data;
-  double *jerk = d->w1;
+  double *jerk = d->w1, change = 0, size = 0;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->common.dae.n * sizeof *d->v);
   if (!d->common.dae.enforces_velocities) { /* r->v includes the error that earlier steps added */
@@ -261,13 +235,20 @@ static int galpha_begin (pw_run *r, double h) {
   }
   if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->common.dae.scratch);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
-  if (status == PW_OK && galpha_vibrates (r, h, jerk)) status = galpha_trial_jerk (r, h, jerk);
   if (status != PW_OK) return status;
+  for (int j = 0; j < d->common.dae.n; j++) {
+    change += r->s->metric[j] * jerk[j] * jerk[j];
+    size += r->s->metric[j] * d->a[j] * d->a[j];
+  }
+  if (h * sqrt (change) > 4 * sqrt (size)) {
+    memcpy (d->w, d->a, (size_t)d->common.dae.n * sizeof *d->w);
+    status = galpha_solve (r, h, r->t + h);
+    if (status < 0) return status;
+    for (int j = 0; j < d->common.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
+  }
   for (int j = 0; j < d->common.dae.n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
   return d->common.dae.enforces_velocities || r->s->holonomic == 0 ? PW_OK : galpha_add_velocity_error (r, h, jerk);
 }
-
-/* ---- Advancing ---- */
 
 static int galpha_step (pw_run *r, double h, double t1) {
   int status = h != r->data->common.h ? galpha_begin (r, h) : PW_OK;

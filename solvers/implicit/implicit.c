@@ -8,8 +8,6 @@ static pw_implicit *implicit_of (pw_run *r) {
   return (pw_implicit *)r->data;
 }
 
-/* ---- Opening ---- */
-
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count) {
   x->memory = pw_alloc_arrays (array, count);
   return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
@@ -56,8 +54,6 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
     row_factor[i] = i - 2 * n < g_rows ? 1 : 1 / c, column_factor[i] = c * e * mass;
   for (int i = 2 * n + x->rows; i < x->size; i++) row_factor[i] = 1, column_factor[i] = c;
 }
-
-/* ---- Advancing ---- */
 
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);

@@ -63,9 +63,7 @@ static pw_convergence leapfrog_test (leapfrog_progress *p) {
   return PW_ITERATE;
 }
 
-/* ---- First half (drift): u and q', by Newton's iteration ----
- *
- * The unknowns are u and L = h/2 (lambda+ - lambda):
+/* First half (drift): u and q', by Newton's iteration.  The unknowns are u and L = h/2 (lambda+ - lambda):
  *
  *   M (u - v - h/2 a) + J (q)^T L = 0        a, lambda: accelerations and multipliers at (t, q, v)
  *   g (t', q + h u) / h = 0                  S (t*, q*) u - b (t*, q*) = 0,   q* = q + h/2 u
@@ -228,8 +226,6 @@ static int kick_solve (pw_run *r, double h, double t1) {
   return convergence == PW_CONVERGED ? pw_update_velocities (r->w, d->common.v1) : PW_RETRY;
 }
 
-/* ---- Opening ---- */
-
 /* The kick has fixed constraints: their signals must not depend on the states that it changes.  Its impulses are those
  * of the symmetric equations, without friction that depends on them. */
 static int leapfrog_check_feedback (const pw_run *r, pw_error *error) {
@@ -270,8 +266,6 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
 static void leapfrog_serialise (pw_run *r, pw_archive *a) {
   pw_serialise_counter (&r->data->common.counter, a);
 }
-
-/* ---- Advancing ---- */
 
 static int leapfrog_step (pw_run *r, double h, double t1) {
   int status = drift_solve (r, h, t1);

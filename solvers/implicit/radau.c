@@ -122,8 +122,6 @@ static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   return PW_OK;
 }
 
-/* ---- Matrices ---- */
-
 /* Determines the pattern of F_y and opens both matrices.  PW_OK or PW_RESOURCE. */
 static int radau_open_matrices (pw_run *r) {
   pw_method_data *d = r->data;
@@ -191,18 +189,6 @@ static int radau_solve_real (pw_method_data *d, double *x) {
   return status;
 }
 
-/* The same with the complex matrix and re + i im for x. */
-static int radau_solve_complex (pw_method_data *d, double *re, double *im) {
-  double *x = d->complex_x;
-  for (int i = 0; i < d->dae.size; i++) x[2 * i] = d->row_factor[i] * re[i], x[2 * i + 1] = d->row_factor[i] * im[i];
-  int status = pw_sparse_solve (&d->complex, x);
-  for (int i = 0; i < d->dae.size; i++)
-    re[i] = d->column_factor[i] * x[2 * i], im[i] = d->column_factor[i] * x[2 * i + 1];
-  return status;
-}
-
-/* ---- Tolerances ---- */
-
 /* The relative tolerance of the error estimate. */
 static double radau_rtol (const pw_run *r) {
   return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
@@ -227,8 +213,6 @@ static void radau_set_tolerances (pw_run *r, double h) {
     d->newton_tolerance[i] = r->fixed_steps ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
   }
 }
-
-/* ---- Newton's iteration ---- */
 
 /* The polynomial p of degree 3 with p (0) = 0 and p (c_i) = p_i is p (x) = sum_i weight[i] p_i. */
 static void radau_basis (double x, double *weight) {
@@ -279,7 +263,7 @@ static double radau_time (const pw_run *r, int k, double h, double t1) {
 /* One correction of W; *size, *round_offs: its largest entry in q, v, in units of newton_tolerance and of round_off. */
 static int radau_correct (pw_run *r, double h, double t1, double *size, double *round_offs) {
   pw_method_data *d = r->data;
-  double *const *W = d->W, *const *F = d->F;
+  double *const *W = d->W, *const *F = d->F, *x = d->complex_x;
   for (int k = 0; k < STAGES; k++) {
     radau_stage (d, k);
     int status = radau_evaluate (r, radau_time (r, k, h, t1), d->Y, F[k]);
@@ -292,7 +276,11 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
     F[1][i] -= b * (radau_alpha * W[1][i] - radau_beta * W[2][i]);
     F[2][i] -= b * (radau_beta * W[1][i] + radau_alpha * W[2][i]);
   }
-  if (radau_solve_real (d, F[0]) != PW_OK || radau_solve_complex (d, F[1], F[2]) != PW_OK) return PW_RESOURCE;
+  for (int i = 0; i < d->dae.size; i++)
+    x[2 * i] = d->row_factor[i] * F[1][i], x[2 * i + 1] = d->row_factor[i] * F[2][i];
+  if (radau_solve_real (d, F[0]) != PW_OK || pw_sparse_solve (&d->complex, x) != PW_OK) return PW_RESOURCE;
+  for (int i = 0; i < d->dae.size; i++)
+    F[1][i] = d->column_factor[i] * x[2 * i], F[2][i] = d->column_factor[i] * x[2 * i + 1];
   *size = *round_offs = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) {
     double most = pw_larger_or_nan (pw_larger_or_nan (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
@@ -375,8 +363,6 @@ static int radau_solve (pw_run *r, double h, double t1) {
   }
 }
 
-/* ---- Errors ---- */
-
 /* The root mean square of the errors of the states in units of their tolerances. */
 static double radau_norm (const pw_method_data *d, const double *e) {
   double sum = 0;
@@ -431,8 +417,6 @@ static int radau_work (pw_run *r, double h, double t1, double *error) {
   *error = fmax (*error, pw_ledger_norm (r, h, r->ledger_at) / fmax (1, radau_rtol (r) / r->settings.rtol));
   return PW_OK;
 }
-
-/* ---- Opening ---- */
 
 /* Sets d->noise at the state reached.  Round-off of the largest coordinate may affect others; at the sine s, solutions
  * magnify it by 1/s^2.  r->saddle must be factorised at the state reached. */
@@ -522,8 +506,6 @@ static void radau_close (pw_run *r) {
   free (d->memory);
   free (d);
 }
-
-/* ---- Advancing ---- */
 
 /* Accelerations and multipliers at the state reached, where J is evaluated: computed from the state, or in singular
  * configurations those of the last stage. */
@@ -651,8 +633,6 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
       d->h = h * (status == PW_RETRY ? d->reduction : 0.25);
   }
 }
-
-/* ---- Samples ---- */
 
 /* The quintic through positions, velocities and accelerations at both ends of the last step, at x in [0, 1]. */
 static void radau_quintic (const pw_run *r, double x, double *q, double *v) {

@@ -42,8 +42,6 @@ struct pw_method_data {
   char *memory;
 };
 
-/* ---- Opening ---- */
-
 static int moreau_restart (pw_run *r, pw_error *error) {
   (void)error;
   r->data->counter = (pw_step_counter){ .base = r->t };
@@ -82,8 +80,6 @@ static void moreau_close (pw_run *r) {
 static void moreau_serialise (pw_run *r, pw_archive *a) {
   pw_serialise_counter (&r->data->counter, a);
 }
-
-/* ---- Steps ---- */
 
 /* q = q + h/2 (v + d->v) from the state reached. */
 static void moreau_positions (pw_run *r, double h) {
@@ -202,8 +198,6 @@ static int moreau_advance (pw_run *r, double t_end, pw_error *error) {
   pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }
-
-/* ---- Samples ---- */
 
 static int moreau_interpolate (void *data, pw_run *r, double t) {
   pw_method_data *d = data;

@@ -57,11 +57,9 @@ struct pw_method_data {
   char *memory;
 };
 
-/* ---- Null-space velocities ----
- *
- * u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the beginning of the step,
- * constant over the step.  W is the metric of positions: the mass matrix, with small weights for massless coordinates.
- * The equations integrated are
+/* Null-space velocities, u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the
+ * beginning of the step, constant over the step.  W is the metric of positions: the mass matrix, with small weights for
+ * massless coordinates.  The equations integrated are
  *
  *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
  *
@@ -213,8 +211,6 @@ static int nullspace_finalise (rk_nullspace *b, pw_projector *p, pw_run *r, doub
   return status;
 }
 
-/* ---- A step ---- */
-
 /* 1 if the next step ends with a coordinate projection. */
 static int rk_projects_next (const pw_run *r) {
   const pw_method_data *d = r->data;
@@ -330,12 +326,6 @@ static int rk_step (pw_run *r, double h, double t1, int project, double *added_e
   return status == PW_OK ? nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
-/* Stores the state reached as the beginning of a step. */
-static void rk_begin_step (pw_run *r) {
-  r->data->nodes = r->data->samples = 0;
-  pw_store_start (&r->data->last, r);
-}
-
 static void rk_point (double *state, size_t n, double **q, double **v, double **a, double **lambda) {
   *q = state, *v = state + n, *a = *v + n, *lambda = *a + n;
 }
@@ -387,12 +377,10 @@ static int rk_fail (pw_run *r, int status, double t, double h, int divided, pw_e
                                             : "a stage of it lands in a singular configuration");
 }
 
-/* ---- Fixed steps, and samples inside the last step ----
- *
- * Fixed steps end at multiples of the step size, at t_end and at breakpoints.  A sample is a step from the beginning of
- * the last step, as accurate as the method.  If a stage of a step or sample lands near a singular configuration, its
- * accelerations are inaccurate.  Then the step, unless it follows a divided one, is divided in two parts, at different
- * times, until two results agree. */
+/* Fixed steps, and samples inside the last step.  Steps end at multiples of the step size, at t_end and at
+ * breakpoints.  A sample is a step from the beginning of the last step, as accurate as the method.  If a stage of a
+ * step or sample lands near a singular configuration, its accelerations are inaccurate.  Then the step, unless it
+ * follows a divided one, is divided in two parts, at different times, until two results agree. */
 
 /* A step to t from the state `from`, which temporarily replaces the state reached: computes the new state, and its
  * ledger in r->ledger_at; with_energy: 1 to compute r->projected_at, too. */
@@ -460,13 +448,12 @@ static int fixed_divide (pw_run *r, const pw_step_start *from, int status, doubl
   return least <= acceptable ? PW_OK : PW_RETRY;
 }
 
-/* ---- Many samples inside the last step of an adaptive method ----
- *
- * From the fifth one at increasing times on, positions are those of the polynomial that has the positions, velocities
- * and accelerations at the ends of the step and of steps to quarters of it; velocities, and the ledger, those of the
- * polynomial with their values and rates there (Hermite interpolation; Stoer & Bulirsch 2002, Introduction to Numerical
- * Analysis, section 2.1.5).  The state is then projected like that of a step.  In the first and in the last quarter the
- * polynomials must agree with steps: forces may jump inside the last step. */
+/* Many samples inside the last step of an adaptive method.  From the fifth one at increasing times on, positions are
+ * those of the polynomial that has the positions, velocities and accelerations at the ends of the step and of steps to
+ * quarters of it; velocities, and the ledger, those of the polynomial with their values and rates there (Hermite
+ * interpolation; Stoer & Bulirsch 2002, Introduction to Numerical Analysis, section 2.1.5).  The state is then
+ * projected like that of a step.  In the first and in the last quarter the polynomials must agree with steps: forces
+ * may jump inside the last step. */
 
 enum { DENSE_FIRST = 5, DENSE_NODES = RK_NODES + 2 };
 #define DENSE_AGREE 0.1 /* largest difference from a step, in units of the scene, over the relative tolerance */
@@ -640,7 +627,7 @@ static int rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Step-size control ----
+/* Step-size control:
  *
  *   h_new = 0.9 h err^(3 m / 4 - k) err_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
  *
@@ -794,17 +781,6 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
 
 /* After a step that was shortened to end at t_end or a breakpoint, the next one has at least the size planned before,
  * and the error is remembered only if the step was long enough to predict that of the next one. */
-static void adapt_accept (pw_run *r, double h, double t1, double added_energy, double err, double most_growth,
-                          int shortened) {
-  pw_method_data *d = r->data;
-  double next = h * fmin (most_growth, adapt_factor (d, err));
-  rk_accept (r, h, t1, added_energy);
-  pw_bound_tolerances (r);
-  d->h = shortened ? fmax (next, d->h) : next;
-  if (!shortened || h > 0.5 * d->h) d->last_error = fmax (err, ADAPT_LEAST_ERROR);
-  r->statistics.steps++;
-}
-
 static int rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
@@ -822,7 +798,12 @@ static int rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     status = adapt_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL, &err);
     if (status < 0) return pw_fail_signal (r->t, error);
     if (err <= 1) {
-      adapt_accept (r, h, t1, added_energy, err, most_growth, shortened);
+      double next = h * fmin (most_growth, adapt_factor (d, err));
+      rk_accept (r, h, t1, added_energy);
+      pw_bound_tolerances (r);
+      d->h = shortened ? fmax (next, d->h) : next;
+      if (!shortened || h > 0.5 * d->h) d->last_error = fmax (err, ADAPT_LEAST_ERROR);
+      r->statistics.steps++;
       return PW_OK;
     }
     r->statistics.rejected++;
@@ -830,8 +811,6 @@ static int rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     most_growth = 1; /* no growth right after a rejection */
   }
 }
-
-/* ---- Options, opening and closing ---- */
 
 static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
 static const char *const rk_positions[] = { "projected", "drift", NULL };
@@ -873,15 +852,6 @@ static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
   return row;
 }
 
-static void rk_list_weights (pw_method_data *d) {
-  const pw_tableau *tableau = d->tableau;
-  const double *A = tableau->A, *const estimate[] = { tableau->e, tableau->e3, tableau->e6 };
-  d->row[0] = rk_nonzero_weights (tableau->b, tableau->stages);
-  for (int i = 1; i < tableau->stages; A += i++) d->row[i] = rk_nonzero_weights (A, i); /* row i has i entries */
-  for (int k = 0; k < 3; k++)
-    if (estimate[k]) d->estimate[k] = rk_nonzero_weights (estimate[k], tableau->stages + 1);
-}
-
 static int rk_allocate (pw_method_data *d, const pw_run *r) {
   enum { ONCE = 8, MOST = ONCE + 3 * PW_RK_STAGES + 3 * RK_NODES }; /* arrays that exist once, not for each stage */
   size_t n = (size_t)r->s->coords + 3, state = pw_state_length (r->s), entries = (size_t)r->entries, count = ONCE;
@@ -910,9 +880,13 @@ static int rk_allocate (pw_method_data *d, const pw_run *r) {
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_fail_memory (r->s, error);
+  const double *A = tableau->A, *const estimate[] = { tableau->e, tableau->e3, tableau->e6 };
   d->tableau = tableau;
   d->own = r->q;
-  rk_list_weights (d);
+  d->row[0] = rk_nonzero_weights (tableau->b, tableau->stages);
+  for (int i = 1; i < tableau->stages; A += i++) d->row[i] = rk_nonzero_weights (A, i); /* row i has i entries */
+  for (int k = 0; k < 3; k++)
+    if (estimate[k]) d->estimate[k] = rk_nonzero_weights (estimate[k], tableau->stages + 1);
   d->holds_signals = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   d->uses_nullspace = pw_stabilised_by (r, PW_NULLSPACE);
@@ -944,7 +918,8 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
     d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
     d->last_error = ADAPT_LEAST_ERROR;
   }
-  rk_begin_step (r);
+  d->nodes = d->samples = 0;
+  pw_store_start (&d->last, r);
   return PW_OK;
 }
 
@@ -960,10 +935,9 @@ int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   return r->fixed_steps ? rk_advance_fixed (r, t_end, error) : rk_advance_adaptive (r, t_end, error);
 }
 
-/* ---- Several steps of fixed size in one call of specialised code ----
- *
- * Results are bit-identical to those of single steps.  What a run does less often than every step (run.c)
- * is done after the last of them, so there are never more than PW_CHECK_INTERVAL. */
+/* Several steps of fixed size in one call of specialised code.  Results are bit-identical to those of single steps.
+ * What a run does less often than every step (run.c) is done after the last of them, so there are never more than
+ * PW_CHECK_INTERVAL. */
 
 /* 1 if the specialised function `steps` does everything that a step of this run needs.  The ledger records the first
  * steps one by one (run.c). */
@@ -1077,46 +1051,34 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
   return status == PW_OK && x.done == 0 ? pw_run_advance (r, t_end, error) : status;
 }
 
-/* Runs whose next steps can be taken together: those with the step size, method and stabilisation of the first. */
-typedef struct {
-  pw_run *const *run;
-  int used, index[PW_LANES_MOST];      /* number of lanes with a run; index in `run` of each lane's run */
-  pw_scene_steps steps[PW_LANES_MOST]; /* of each lane */
-} several_lanes;
-
-/* Plans the next steps of run i, if it can share lanes with the first. */
-static void several_add (several_lanes *x, int i, double t_end) {
-  const pw_run *first = x->used > 0 ? x->run[x->index[0]] : NULL, *r = x->run[i];
-  if (first && (r->method != first->method || r->stabilisation != first->stabilisation ||
-                r->settings.step != first->settings.step))
-    return;
-  if (several_plan (x->run[i], t_end, t_end, 1, &x->steps[x->used]) > 0) x->index[x->used++] = i;
-}
-
+/* Steps of runs with the step size, method and stabilisation of the first are taken together. */
 void pw_runs_advance (pw_run *const *runs, int count, const double *t_end, const pw_specialised_lanes *code,
                       void *memory, int *status, pw_error *error) {
-  several_lanes x = { .run = runs };
-  int done[PW_LANES_MOST] = { 0 };
+  int done[PW_LANES_MOST] = { 0 }, used = 0, index[PW_LANES_MOST]; /* of each lane that is used: its run */
+  pw_scene_steps steps[PW_LANES_MOST];
   for (int i = 0; i < count && code && count <= code->lanes; i++) {
     if (runs[i] == NULL) continue; /* refused below */
     runs[i]->stopped = 0;
+    const pw_run *r = runs[i], *first = used > 0 ? runs[index[0]] : r;
     if (pw_run_stop_requested (runs[i]))
       status[i] = PW_STOPPED, done[i] = 1;
-    else
-      several_add (&x, i, t_end[i]);
+    else if (r->method == first->method && r->stabilisation == first->stabilisation &&
+             r->settings.step == first->settings.step &&
+             several_plan (runs[i], t_end[i], t_end[i], 1, &steps[used]) > 0)
+      index[used++] = i;
   }
-  if (x.used > 0 && 2 * x.used > code->lanes) { /* with half of them empty, one run after the other is faster */
-    pw_scene_steps *steps[PW_LANES_MOST];
+  if (used > 0 && 2 * used > code->lanes) { /* with half of them empty, one run after the other is faster */
+    pw_scene_steps *lane[PW_LANES_MOST];
     pw_scene *scene[PW_LANES_MOST];
     for (int k = 0; k < code->lanes; k++) { /* empty lanes repeat the steps of the first one */
-      if (k >= x.used) x.steps[k] = x.steps[0], x.index[k] = x.index[0];
-      steps[k] = &x.steps[k], scene[k] = runs[x.index[k]]->scene;
+      if (k >= used) steps[k] = steps[0], index[k] = index[0];
+      lane[k] = &steps[k], scene[k] = runs[index[k]]->scene;
     }
-    code->steps (scene, steps, memory);
-    for (int k = 0; k < x.used; k++) {
-      int i = x.index[k];
-      status[i] = several_finish (runs[i], &x.steps[k], error ? &error[i] : NULL);
-      done[i] = x.steps[k].done > 0 || status[i] != PW_OK;
+    code->steps (scene, lane, memory);
+    for (int k = 0; k < used; k++) {
+      int i = index[k];
+      status[i] = several_finish (runs[i], &steps[k], error ? &error[i] : NULL);
+      done[i] = steps[k].done > 0 || status[i] != PW_OK;
     }
   }
   for (int i = 0; i < count; i++)

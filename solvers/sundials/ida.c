@@ -19,8 +19,6 @@ struct pw_method_data {
   double *unit;    /* active rows: 1 for a force, L for a moment */
 };
 
-/* ---- Equations ---- */
-
 /* Updates kinematics and J at the unknowns y. */
 static int ida_update (pw_method_data *d, double t, const double *y) {
   return pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
@@ -57,16 +55,6 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   return 0;
 }
 
-/* ---- Error weights ---- */
-
-/* The coefficient c in the matrix dF/dy + c dF/dy' of the current step, 1 / h before the first; at least 1 / T. */
-static double ida_leading_coefficient (const pw_method_data *d) {
-  const pw_run *r = d->sun.run;
-  realtype c = 0;
-  if (r->t == d->sun.t0 || IDAGetCurrentCj (d->ida, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
-  return fmax (c, 1 / r->w->scale.time);
-}
-
 /* The scale of forces [N]: from the masses, else from the multipliers, else 1. */
 static double ida_force_scale (const pw_run *r) {
   const pw_system *s = r->s;
@@ -81,7 +69,8 @@ static double ida_force_scale (const pw_run *r) {
  * equation is one of angles.
  *
  * Where J v = eta is enforced, corrections of lambda and mu are those of v and q divided by the step.  Outside the
- * error test, their tolerances are therefore multiplied by c T, for the test of convergence.  In si1 the unknowns are
+ * error test, their tolerances are therefore multiplied by c T, for the test of convergence, with the c of the matrix
+ * dF/dy + c dF/dy' of the current step, 1 / h before the first, but at least 1 / T.  In si1 the unknowns are
  * the integrals of the multipliers, whose tolerances are those of the multipliers times T, with lambda of the previous
  * step. */
 static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
@@ -91,8 +80,10 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
   const double *y = N_VGetArrayPointer (vy);
   int relaxed = d->dae.enforces_velocities && !d->dae.integrates_multipliers;
   double *w = N_VGetArrayPointer (weights), force = ida_force_scale (r);
-  double L = r->s->scale.length, T = r->w->scale.time, c = relaxed ? ida_leading_coefficient (d) : 1 / T;
-  double relax = d->dae.integrates_multipliers ? T : c * T,
+  double L = r->s->scale.length, T = r->w->scale.time, c = 0;
+  int is_known = relaxed && r->t != d->sun.t0 && IDAGetCurrentCj (d->ida, &c) == IDA_SUCCESS && c != 0;
+  if (relaxed && !is_known) c = 1 / pw_first_step (r);
+  double relax = d->dae.integrates_multipliers ? T : fmax (c, 1 / T) * T,
          mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
   for (int i = 0; i < d->dae.rows; i++) {
@@ -102,8 +93,6 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
   for (int i = 0; i < d->dae.mu_count; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
   return 0;
 }
-
-/* ---- States ---- */
 
 /* Fills IDA's vectors with the state reached. */
 static void ida_fill_vectors (pw_method_data *d) {
@@ -149,31 +138,11 @@ static int ida_interpolate (pw_method_data *d, double t) {
   return IDA_SUCCESS;
 }
 
-/* ---- Work and losses ---- */
-
 static int ida_power (pw_run *r, double t, double *rate) {
   int flag = ida_interpolate (r->data, t);
   if (flag == IDA_SUCCESS) pw_ledger_rates (r, r->lambda_at, rate);
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
-
-/* Work and losses up to the state reached; factorised: 1 if the saddle-point matrix is factorised there.  The
- * multipliers that IDA computes with J v = eta are not accurate enough to be integrated, and are recomputed.  PW_METHOD
- * if a signal failed. */
-static int ida_work (pw_method_data *d, int factorised) {
-  pw_run *r = d->sun.run;
-  int order = 1;
-  const double *lambda = r->lambda;
-  if (factorised && d->dae.enforces_velocities && pw_ledger_uses_multipliers (r)) {
-    pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
-    lambda = r->lambda_at;
-  }
-  pw_ledger_rates (r, lambda, r->rate);
-  IDAGetLastOrder (d->ida, &order);
-  return pw_sun_integrate_ledger (&d->sun, order);
-}
-
-/* ---- Opening ---- */
 
 static int ida_open_vectors (pw_method_data *d, pw_run *r) {
   if (pw_sun_open (&d->sun, r, d->dae.size, ida_power) != PW_OK) return PW_RESOURCE;
@@ -228,8 +197,6 @@ static void ida_close (pw_run *r) {
   free (d);
 }
 
-/* ---- Advancing ---- */
-
 static void ida_statistics (pw_method_data *d) {
   pw_statistics *s = &d->sun.run->statistics, now = { 0 };
   const pw_statistics *before = &d->sun.before;
@@ -263,7 +230,8 @@ static int ida_restart (pw_run *r, pw_error *error) {
 
 /* Makes (y, y') the state reached and updates the ledger.  With J v = eta, the multipliers are IDA's.  On acceleration
  * level, only the Newton iteration determines those of prescribed motions, and they may drift without effect on the
- * motion: there all are recomputed.  PW_METHOD if a signal failed. */
+ * motion: there all are recomputed.  For the ledger they are, too: those of IDA are not accurate enough to be
+ * integrated.  PW_METHOD if a signal failed. */
 static int ida_reach (pw_method_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);
@@ -274,7 +242,13 @@ static int ida_reach (pw_method_data *d) {
   if (status < 0) return status;
   if (status == PW_OK && !d->dae.enforces_velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  return r->entries > 0 ? ida_work (d, status == PW_OK) : PW_OK;
+  if (r->entries == 0) return PW_OK;
+  const int recomputes = status == PW_OK && d->dae.enforces_velocities && pw_ledger_uses_multipliers (r);
+  int order = 1;
+  if (recomputes) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
+  pw_ledger_rates (r, recomputes ? r->lambda_at : r->lambda, r->rate);
+  IDAGetLastOrder (d->ida, &order);
+  return pw_sun_integrate_ledger (&d->sun, order);
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {

@@ -54,8 +54,7 @@ static int multistep_accelerate (pw_method_data *d, double t, const double *y) {
   return status == PW_OK ? 0 : status > 0 ? 1 : -1;
 }
 
-/* ---- Newton's iteration for BDF: (I - gamma df/dy) x = b without forming the dense df/dy ----
- *
+/* Newton's iteration for BDF, (I - gamma df/dy) x = b, without forming the dense df/dy:
  * y = (q, v), y' = (v, a), and gamma is CVODES' coefficient of the step.  With T = (T_q, T_v, T_a, T_lambda), the
  * sparse derivatives of the equations of motion (tangent.c), a change of the state changes a and lambda so that T (dq,
  * dv, da, dlambda) = 0.  With
@@ -114,27 +113,20 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
   return 0;
 }
 
-/* right = - T_q (b_q + gamma b_v) - T_v b_v */
-static void newton_right_side (const pw_method_data *d, const double *b, double *right) {
-  const bdf_newton *w = &d->newton;
-  const pw_scatter_map *T = &w->tangent.scatter;
-  int n = d->n;
-  memset (right, 0, (size_t)(n + w->tangent.rows) * sizeof *right);
-  for (int c = 0; c < 2 * n; c++) {
-    double factor = c < n ? b[c] + w->gamma * b[n + c] : b[c];
-    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++) right[T->rowind[i]] -= T->value[i] * factor;
-  }
-}
-
 static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
   pw_method_data *d = solver->content;
   bdf_newton *w = &d->newton;
+  const pw_scatter_map *T = &w->tangent.scatter;
   const double *b = N_VGetArrayPointer (vb), *da = w->right;
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
   (void)matrix, (void)tolerance;
   if (d->sun.run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
-  newton_right_side (d, b, w->right);
+  memset (w->right, 0, (size_t)(n + w->tangent.rows) * sizeof *w->right);
+  for (int c = 0; c < 2 * n; c++) { /* - T_q (b_q + gamma b_v) - T_v b_v */
+    double factor = c < n ? b[c] + w->gamma * b[n + c] : b[c];
+    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++) w->right[T->rowind[i]] -= T->value[i] * factor;
+  }
   if (pw_sparse_solve (&d->sun.sparse, w->right) != PW_OK) return SUNLS_PACKAGE_FAIL_UNREC;
   for (int j = 0; j < n; j++) {
     x[n + j] = b[n + j] + w->gamma * da[j];
@@ -161,8 +153,6 @@ static int newton_open (pw_method_data *d) {
   return failed ? PW_RESOURCE : PW_OK;
 }
 
-/* ---- Functions that CVODES calls ---- */
-
 static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, void *data) {
   pw_method_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
@@ -180,33 +170,22 @@ static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
   return 0;
 }
 
-/* ---- Projection ---- */
-
 /* Projects q and v at t.  Returns as pw_project_positions. */
 static int multistep_project (pw_method_data *d, double t, double *q, double *v) {
   int status = pw_project_positions (&d->projector, d->sun.run, t, q, v);
   return status == PW_OK ? pw_project_velocities (&d->projector, d->sun.run, v) : status;
 }
 
-/* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
- * part of the whole error, so that the displacement off the constraints is at most rtol^(3/4) as in rk.c.  That
- * displacement has tangential effects that the estimate misses: the accelerations of the step are those of the
- * displaced state. */
-static void multistep_project_error (pw_method_data *d, double *e) {
-  pw_run *r = d->sun.run;
-  double *whole = d->error, share = sqrt (sqrt (r->settings.rtol));
-  memcpy (whole, e, 2 * (size_t)d->n * sizeof *e);
-  pw_project_error (r, d->projector.velocity, e, r->s->holonomic);
-  pw_project_error (r, d->projector.velocity, e + d->n, r->s->rows);
-  for (int j = 0; j < 2 * d->n; j++) e[j] += share * (whole[j] - e[j]);
-}
-
-/* Called by CVODES: the change of y by the projection; unless `error` is NULL, projects this error estimate, too. */
+/* Called by CVODES: the change of y by the projection.  Unless `error` is NULL, leaves of this estimate the part
+ * tangential to the constraints (Eich 1993), in the metric of the projection, plus a small part of the whole, so that
+ * the displacement off the constraints is at most rtol^(3/4) as in rk.c.  That displacement has tangential effects that
+ * the estimate misses: the accelerations of the step are those of the displaced state. */
 static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype tolerance, N_Vector error,
                               void *data) {
   pw_method_data *d = data;
-  const double *y = N_VGetArrayPointer (vy);
-  double *out = N_VGetArrayPointer (change);
+  pw_run *r = d->sun.run;
+  const double *y = N_VGetArrayPointer (vy), share = sqrt (sqrt (r->settings.rtol));
+  double *out = N_VGetArrayPointer (change), *e = error ? N_VGetArrayPointer (error) : NULL;
   size_t bytes = (size_t)d->n * sizeof *y;
   (void)tolerance; /* projections are accurate to round-off */
   memcpy (d->q, y, bytes);
@@ -216,11 +195,14 @@ static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype
     out[j] = d->q[j] - y[j];
     out[d->n + j] = d->v[j] - y[d->n + j];
   }
-  if (status == PW_OK && error) multistep_project_error (d, N_VGetArrayPointer (error));
-  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
+  if (status != PW_OK) return status > 0 ? 1 : -1;
+  if (e == NULL) return 0;
+  memcpy (d->error, e, 2 * bytes);
+  pw_project_error (r, d->projector.velocity, e, r->s->holonomic);
+  pw_project_error (r, d->projector.velocity, e + d->n, r->s->rows);
+  for (int j = 0; j < 2 * d->n; j++) e[j] += share * (d->error[j] - e[j]);
+  return 0;
 }
-
-/* ---- Inside the last step ---- */
 
 /* Accelerations and multipliers at (t, q, v), projected first if `project` is 1.  No configuration is refused as too
  * nearly singular, and the statistics do not change. */
@@ -257,20 +239,10 @@ static int multistep_power (pw_run *r, double t, double *rate) {
   return status;
 }
 
-/* ---- Opening ---- */
-
-static int multistep_open_iteration (pw_method_data *d, int formula) {
-  pw_sun *x = &d->sun;
-  int newton = formula == CV_BDF;
-  if (newton && newton_open (d) != PW_OK) return PW_RESOURCE;
-  if (newton && !x->run->s->saturates) return PW_OK;
-  x->iteration = newton ? SUNNonlinSol_Newton (x->y, x->context) : SUNNonlinSol_FixedPoint (x->y, 0, x->context);
-  if (x->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, x->iteration)) return PW_RESOURCE;
-  return newton ? pw_sun_test_newton (x) : PW_OK;
-}
-
 static int multistep_open_solver (pw_method_data *d, int formula) {
-  pw_run *r = d->sun.run;
+  pw_sun *x = &d->sun;
+  pw_run *r = x->run;
+  const int newton = formula == CV_BDF;
   void *m = d->cvode = CVodeCreate (formula, d->sun.context);
   if (m == NULL || CVodeSetErrHandlerFn (m, pw_sun_message, &d->sun) || CVodeSetUserData (m, d) ||
       CVodeInit (m, multistep_derivative, r->t, d->sun.y) || CVodeWFtolerances (m, multistep_weigh) ||
@@ -281,7 +253,11 @@ static int multistep_open_solver (pw_method_data *d, int formula) {
   if (d->projects &&
       (CVodeSetProjFn (m, multistep_correct) || CVodeSetProjFrequency (m, (long)pw_run_option (r, "every"))))
     return PW_RESOURCE;
-  return multistep_open_iteration (d, formula);
+  if (newton && newton_open (d) != PW_OK) return PW_RESOURCE;
+  if (newton && !r->s->saturates) return PW_OK;
+  x->iteration = newton ? SUNNonlinSol_Newton (x->y, x->context) : SUNNonlinSol_FixedPoint (x->y, 0, x->context);
+  if (x->iteration == NULL || CVodeSetNonlinearSolver (m, x->iteration)) return PW_RESOURCE;
+  return newton ? pw_sun_test_newton (x) : PW_OK;
 }
 
 static int multistep_open (pw_run *r, int formula, pw_error *error) {
@@ -312,8 +288,6 @@ static void multistep_close (pw_run *r) {
   free (d->memory);
   free (d);
 }
-
-/* ---- Advancing ---- */
 
 static void multistep_count (pw_method_data *d) {
   pw_statistics *s = &d->sun.run->statistics;
@@ -352,17 +326,6 @@ static int multistep_evaluate (pw_method_data *d) {
   return status;
 }
 
-/* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
- * not accurate enough.  Returns as pw_sun_integrate_ledger. */
-static int multistep_work (pw_method_data *d) {
-  pw_run *r = d->sun.run;
-  int order = 1;
-  if (d->sun.solver && pw_ledger_uses_multipliers (r)) (void)multistep_evaluate (d);
-  pw_ledger_rates (r, r->lambda, r->rate);
-  CVodeGetLastOrder (d->cvode, &order);
-  return pw_sun_integrate_ledger (&d->sun, order);
-}
-
 /* Makes y the state reached at t and updates the ledger.  Accelerations and multipliers remain those of the last
  * iterate until multistep_at or multistep_evaluate computes them, which saves one evaluation in three. */
 static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
@@ -377,7 +340,14 @@ static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_bound_tolerances (r);
-  if (r->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  if (r->entries >
+      0) { /* the multipliers of the last Newton iterate, perhaps the prediction, are not accurate enough */
+    int order = 1;
+    if (d->sun.solver && pw_ledger_uses_multipliers (r)) (void)multistep_evaluate (d);
+    pw_ledger_rates (r, r->lambda, r->rate);
+    CVodeGetLastOrder (d->cvode, &order);
+    if (pw_sun_integrate_ledger (&d->sun, order) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  }
   pw_forget_residuals (r); /* those of projections before and inside the step */
   return PW_OK;
 }

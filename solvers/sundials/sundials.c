@@ -17,12 +17,9 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
                    CV_LSETUP_FAIL == IDA_LSETUP_FAIL && CV_TOO_MUCH_ACC == IDA_TOO_MUCH_ACC,
                "CVODES and IDAS have the same flags");
 
-/* ---- Vectors ----
- *
- * Serial vectors with faster operations than those of SUNDIALS.  A step of high order adds dozens of
- * vectors of a dozen entries, in libraries that distributions may build without optimisation.  These operations are
- * plain loops, including the fused operations on several vectors.  They round like those of SUNDIALS, except that
- * SUNDIALS computes a x + a y as a (x + y) and a x - a y as a (x - y). */
+/* Serial vectors with faster sums and products than those of SUNDIALS: a step of high order adds dozens of vectors of a
+ * dozen entries, in libraries that distributions may build without optimisation.  They round like those of SUNDIALS,
+ * except that SUNDIALS computes a x + a y as a (x + y) and a x - a y as a (x - y). */
 
 static void vectors_linear_sum (realtype a, N_Vector vx, realtype b, N_Vector vy, N_Vector vz) {
   const double *x = NV_DATA_S (vx), *y = NV_DATA_S (vy);
@@ -34,24 +31,6 @@ static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
   const double *x = NV_DATA_S (vx);
   double *z = NV_DATA_S (vz);
   for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c * x[i];
-}
-
-/* z = sum_k c_k x_k */
-static int vectors_combine (int count, realtype *c, N_Vector *x, N_Vector z) {
-  vectors_scale (c[0], x[0], z);
-  for (int k = 1; k < count; k++) vectors_linear_sum (c[k], x[k], 1, z, z);
-  return 0;
-}
-
-/* z_k = a_k x + y_k */
-static int vectors_add_to (int count, realtype *a, N_Vector x, N_Vector *y, N_Vector *z) {
-  for (int k = 0; k < count; k++) vectors_linear_sum (a[k], x, 1, y[k], z[k]);
-  return 0;
-}
-
-static int vectors_scale_each (int count, realtype *c, N_Vector *x, N_Vector *z) {
-  for (int k = 0; k < count; k++) vectors_scale (c[k], x[k], z[k]);
-  return 0;
 }
 
 /* sqrt (sum (x_i w_i)^2 / n), with the n of all entries; unless id is NULL, the sum is over id_i > 0 only. */
@@ -77,15 +56,10 @@ N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
   if (v == NULL) return NULL;
   v->ops->nvlinearsum = vectors_linear_sum;
   v->ops->nvscale = vectors_scale;
-  v->ops->nvlinearcombination = vectors_combine;
-  v->ops->nvscaleaddmulti = vectors_add_to;
-  v->ops->nvscalevectorarray = vectors_scale_each;
   v->ops->nvwrmsnorm = vectors_norm;
   v->ops->nvwrmsnormmask = vectors_norm_masked;
   return v;
 }
-
-/* ---- Opening ---- */
 
 static void quadrature_store_rates (pw_sun *x) {
   x->t[0] = x->run->t;
@@ -134,8 +108,6 @@ void pw_sun_close (pw_sun *x) {
   free (x->memory);
 }
 
-/* ---- Linear solver ---- */
-
 static SUNLinearSolver_Type sun_solver_type (SUNLinearSolver solver) {
   (void)solver;
   return SUNLINEARSOLVER_DIRECT;
@@ -181,8 +153,6 @@ int pw_sun_open_solver (pw_sun *x, int size, pw_scatter_map *map, void *content,
   return pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, map->colptr, map->rowind);
 }
 
-/* ---- Newton's iteration, error weights ---- */
-
 /* Called by SUNDIALS: tests the size of the correction, or of the error that remains after it at the current rate of
  * convergence, whichever is smaller; data: size of the previous correction. */
 static int sun_test_convergence (SUNNonlinearSolver newton, N_Vector y, N_Vector correction, realtype tolerance,
@@ -208,8 +178,6 @@ void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {
     w[n + j] = 1 / pw_tolerance (x->run, n + j, y[n + j]);
   }
 }
-
-/* ---- Errors ---- */
 
 void pw_sun_message (int code, const char *module, const char *function, char *text, void *sun) {
   pw_sun *x = sun;
@@ -256,11 +224,9 @@ char *pw_library_versions (char *buffer, size_t size) {
   return buffer;
 }
 
-/* ---- Work and losses along the steps ----
- *
- * The integral of a polynomial through the rates at the states reached, of a degree one above the order of the step
- * if enough are stored, at negligible cost; where that is not accurate enough, of the rates that the method
- * interpolates at nodes inside the step.
+/* Work and losses along the steps: the integral of a polynomial through the rates at the states reached, of a degree
+ * one above the order of the step if enough are stored, at negligible cost; where that is not accurate enough, of the
+ * rates that the method interpolates at nodes inside the step.
  *
  * The difference from the polynomial of the next lower degree estimates the error.  Powers may vanish at the ends of
  * all steps but not between them, so the work and losses of a step are also compared with the change of energy. */
