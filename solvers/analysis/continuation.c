@@ -61,23 +61,17 @@ static int newton_linearise (pw_branch *b, const double *u, pw_error *error) {
   return status;
 }
 
-/* Adds `extra` rows to the n columns of J: the row c, or if c is NULL rows with `diagonal` on their diagonal. */
-static void newton_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
-  size_t m = (size_t)b->problem.equations, rows = m + (size_t)extra;
-  for (size_t j = (size_t)n; j-- > 0;) {
-    double *column = b->J + j * rows;
-    memmove (column, b->J + j * m, m * sizeof *column);
-    memset (column + m, 0, (size_t)extra * sizeof *column);
-    column[m + (c ? 0 : j)] = c ? c[j] : diagonal;
-  }
-}
-
 /* du = the shortest least-squares solution of J du = right and c . du = value.  If c is NULL, p is constant, and
  * damping^2 |du|^2 is added to the sum of squares.  J is destroyed. */
 static int newton_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
   int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
   int rows = m + extra, large = rows > n ? rows : n, rank;
-  if (extra) newton_extend (b, n, extra, c, damping);
+  for (int j = n; extra && j-- > 0;) { /* J gets the row c, or rows with the damping on their diagonal */
+    double *column = b->J + j * rows;
+    memmove (column, b->J + j * m, (size_t)m * sizeof *column);
+    memset (column + m, 0, (size_t)extra * sizeof *column);
+    column[m + (c ? 0 : j)] = c ? c[j] : damping;
+  }
   for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
   if (c) b->du[m] = value;
   for (int i = 0; i < rows * n; i++)
@@ -153,8 +147,6 @@ static int newton_tangent (pw_branch *b, const double *u, const double *c, doubl
   for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
   return isfinite (norm) && norm > 0 && fabs (dot - 1) < 1e-3 ? PW_OK : PW_RETRY;
 }
-
-/* ---- Points and steps ---- */
 
 enum { LOCATE_MOST = 60 };               /* iterations that locate an event */
 static const double BRANCH_STEEP = 1e-3, /* smallest slope of p along a branch that limits steps by max_change */
@@ -251,23 +243,19 @@ static int branch_correct (pw_branch *b, const double *tangent, double farthest,
   return newton_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
-/* Whether p changes around a fold as its slopes at two points predict, by their mean: p of solutions that scatter at a
- * cusp does not.  A solution is accurate to about NEWTON_EXACT times the tolerance. */
-static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double chord) {
-  int p = b->problem.unknowns;
-  double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
-  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + NEWTON_EXACT * b->problem.tolerance / chord;
-  return slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
-}
-
-/* Whether two points are on one smooth branch: their tangents differ little, the chord between them has the direction
- * of the sum of these, and branch_parabolic holds. */
+/* Whether two points are on one smooth branch: their tangents differ little, and the chord between them has the
+ * direction of the sum of these.  Around a fold p changes as its slopes at both predict, by their mean: p of solutions
+ * that scatter at a cusp does not.  A solution is accurate to about NEWTON_EXACT times the tolerance. */
 static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
   double chord = branch_distance (b, to->u, from->u), dot = 0, off = 0;
   for (int j = 0; j <= b->problem.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
   for (int j = 0; j <= b->problem.unknowns; j++)
     off += pow ((to->u[j] - from->u[j]) / chord - (to->tangent[j] + from->tangent[j]) / sqrt (2 + 2 * dot), 2);
-  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT && branch_parabolic (b, from, to, chord);
+  const int p = b->problem.unknowns;
+  double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
+  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + NEWTON_EXACT * b->problem.tolerance / chord;
+  int is_parabolic = slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
+  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT && is_parabolic;
 }
 
 /* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold.  A
@@ -287,7 +275,6 @@ static int branch_check (pw_branch *b, pw_error *error) {
   return b->problem.check_step ? b->problem.check_step (b->problem.context, b->reached.u, b->next.u, error) : PW_OK;
 }
 
-/* A step of length b->step to b->next. */
 static int branch_try (pw_branch *b, pw_error *error) {
   for (int j = 0; j <= b->problem.unknowns; j++) b->next.u[j] = b->reached.u[j] + b->step * b->reached.tangent[j];
   int status = branch_correct (b, b->reached.tangent, BRANCH_APART * b->step, &b->next, error);
@@ -295,7 +282,6 @@ static int branch_try (pw_branch *b, pw_error *error) {
   return b->bounded && branch_passes_end (b) ? PW_RETRY : branch_check (b, error);
 }
 
-/* Makes b->next the point reached. */
 static void branch_accept (pw_branch *b) {
   int n = b->problem.unknowns;
   pw_branch_point oldest = b->previous;
@@ -389,8 +375,6 @@ int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_erro
   return PW_OK;
 }
 
-/* ---- Events and ends ---- */
-
 /* Where b->found is: pw_branch_event.fraction. */
 static double branch_fraction (const pw_branch *b) {
   double part = 0, whole = 0;
@@ -432,7 +416,6 @@ static int branch_slope_of_p (void *branch, const pw_branch_point *point, double
   return PW_OK;
 }
 
-/* Whether the last step has led to the first point again. */
 static int branch_closed (const pw_branch *b) {
   if (b->reached.u[b->problem.unknowns] != b->first.u[b->problem.unknowns]) return 0;
   return branch_distance (b, b->reached.u, b->first.u) <= PW_BRANCH_SAME ||

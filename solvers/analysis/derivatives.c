@@ -27,8 +27,6 @@ static const double ENOUGH = 1e-8, /* relative error of a derivative that needs 
     UNKNOWN = 0.01,                /* of an error relative to output / parameter, or ... */
     UNKNOWN_SI = 1e-6;             /* ... of output, that makes a derivative unknown if it exceeds half of it */
 
-/* ---- Formulas ---- */
-
 /* Weights of values at nodes, whole numbers, in the derivative at 0 of the polynomial through them. */
 static void difference_weights (const int *node, int count, double *weight) {
   for (int i = 0; i < count; i++) {
@@ -49,9 +47,9 @@ static int difference_node (int side, int i) {
   return side ? side * (i + 1) : (i % 2 ? 1 : -1) * (i / 2 + 1);
 }
 
-/* The derivative times the step by the formula of this order through the nodes from `first` on, `stride` apart; f0: the
- * value at 0, f: at the nodes, `outputs` apart.  *size: the sum of the absolute weights. */
-static double difference_formula (int side, int order, double f0, const double *f, int outputs, double *size) {
+/* The derivative times the step by the formula of this order through the first nodes; f0: the value at 0, f: at the
+ * nodes, `stride` apart.  *size: the sum of the absolute weights. */
+static double difference_formula (int side, int order, double f0, const double *f, int stride, double *size) {
   int node[MOST + 1] = { 0 }, count = 0, with_zero = side != 0;
   double weight[MOST + 1], sum = 0;
   count = with_zero;
@@ -60,18 +58,9 @@ static double difference_formula (int side, int order, double f0, const double *
   *size = 0;
   for (int i = 0; i < count; i++) {
     /* differences from f0, so that a large constant does not matter */
-    if (i >= with_zero) sum += weight[i] * (f[(i - with_zero) * outputs] - f0);
+    if (i >= with_zero) sum += weight[i] * (f[(i - with_zero) * stride] - f0);
     *size += fabs (weight[i]);
   }
-  return sum;
-}
-
-/* The same on one side of central nodes 1, 2, 3: orders 2 and 3. */
-static double difference_one_sided (int side, int order, double f0, const double *f, int outputs) {
-  const int node[] = { 0, side, 2 * side, 3 * side };
-  double weight[4], sum = 0;
-  difference_weights (node, order + 1, weight);
-  for (int i = 1; i <= order; i++) sum += weight[i] * (f[(2 * (i - 1) + (side > 0)) * outputs] - f0);
   return sum;
 }
 
@@ -150,7 +139,6 @@ static int difference_want (difference_parameter *p, int decade, int side) {
   return 1;
 }
 
-/* The derivative of output i by a level. */
 static difference_estimate difference_at (const difference *x, const difference_level *l, int i) {
   const int n = x->d->outputs, most = x->d->neighbours;
   const double f0 = x->value[i], *f = l->value + i, h = l->step;
@@ -174,15 +162,13 @@ static difference_estimate difference_at (const difference *x, const difference_
   if (!isfinite (e.error)) return e.derivative = NAN, e.error = INFINITY, e;
   if (l->side || most < MOST) return e;
   double own[2], error = 16 * noise;
-  for (int k = 0; k < 2; k++) {
-    own[k] = difference_one_sided (k ? 1 : -1, 3, f0, f, n);
-    error += fabs (own[k] - difference_one_sided (k ? 1 : -1, 2, f0, f, n));
+  for (int k = 0; k < 2; k++) { /* with the central nodes on one side, orders 3 and 2 */
+    own[k] = difference_formula (k ? 1 : -1, 3, f0, f + k * n, 2 * n, &least);
+    error += fabs (own[k] - difference_formula (k ? 1 : -1, 2, f0, f + k * n, 2 * n, &least));
   }
   if (fabs (own[1] - own[0]) > 2 * error) e.below = own[0] / h, e.above = own[1] / h, e.error = INFINITY;
   return e;
 }
-
-/* ---- Runs ---- */
 
 /* A run of a neighbour or with larger tolerances may fail; others end everything, as do memory and stops. */
 static void difference_failed (difference *x, const difference_task *task, int status, const pw_error *own) {
@@ -252,8 +238,6 @@ static int difference_evaluate (difference *x) {
   return x->status;
 }
 
-/* ---- The choice of levels ---- */
-
 /* What is added to the error of level a: by how much it contradicts estimates with smaller steps, which are nearer to a
  * derivative.  That with the smallest step must agree with one of a larger step that has two digits or a similar error;
  * otherwise its error may be small by chance. */
@@ -311,28 +295,21 @@ static double difference_output_size (const difference *x, const difference_para
   return size;
 }
 
-/* The decades of the largest and the smallest step that could be run, or the failed ones. */
-static void difference_range (const difference_parameter *p, int *coarsest, int *finest, int *coarse_failed) {
-  *coarsest = FINEST + 1, *finest = LEAST - 1, *coarse_failed = 0;
-  for (int a = 0; a < p->levels; a++) {
-    const difference_level *l = &p->level[a];
-    int failed = l->failed[0] || l->failed[1];
-    if (l->decade > *finest) *finest = l->decade;
-    if (failed) *coarse_failed = 1;
-    if (!failed && l->decade < *coarsest) *coarsest = l->decade;
-  }
-}
-
-/* Wants further levels for output i. */
 static void difference_improve (const difference *x, difference_parameter *p, int i) {
-  int best, coarsest, finest, coarse_failed;
+  int best, coarsest = FINEST + 1, finest = LEAST - 1, has_failed = 0; /* decades of the largest step, without failed
+                                                                        * ones, and of the smallest */
   const difference_estimate e = difference_best (x, p, i, &best);
   const double natural = fmax (fabs (x->d->x[p->parameter]), 1), size = difference_output_size (x, p, i);
   if (!isfinite (x->value[i])) return;
   if (isfinite (e.error) && e.error <= ENOUGH * fabs (e.derivative)) return;
   if (isfinite (e.error) && e.error * natural <= NO_EFFECT * size && fabs (e.derivative) * natural <= NO_EFFECT * size)
     return;
-  difference_range (p, &coarsest, &finest, &coarse_failed);
+  for (int a = 0; a < p->levels; a++) {
+    const int failed = p->level[a].failed[0] || p->level[a].failed[1], decade = p->level[a].decade;
+    has_failed |= failed;
+    if (decade > finest) finest = decade;
+    if (!failed && decade < coarsest) coarsest = decade;
+  }
   if (best < 0) {                                        /* no level is consistent, or all have failed */
     for (int a = 0, levels = p->levels; a < levels; a++) /* neighbours on the other side of those that fail */
       if (p->level[a].failed[0] != p->level[a].failed[1] && p->level[a].side == 0)
@@ -342,7 +319,7 @@ static void difference_improve (const difference *x, difference_parameter *p, in
     return;
   }
   const double noise = e.noise * pow (10, finest + 1 - p->level[best].decade); /* at the next smaller step */
-  if (p->level[best].decade == coarsest && !coarse_failed && e.noise > e.error / 4)
+  if (p->level[best].decade == coarsest && !has_failed && e.noise > e.error / 4)
     difference_want (p, coarsest - (e.same || e.noise > fabs (e.derivative) ? SKIPPED : 1), 0);
   if (noise < e.error / 4) difference_want (p, finest + 1, 0);
 }
@@ -394,8 +371,6 @@ static pw_derivative difference_of_fixed (const difference *x, const difference_
                           x->d->neighbours == 2 ? NAN : e.error, NAN, NAN };
 }
 
-/* ---- Opening ---- */
-
 static int difference_check (const pw_difference_settings *d, const pw_derivative *out, pw_error *error) {
   int status = pw_require (d, "a difference", error);
   if (status == PW_OK) status = pw_require (out, "room for derivatives", error);
@@ -424,25 +399,23 @@ static int difference_open (difference *x) {
   return x->status;
 }
 
-/* The error of an output of a run: tolerance by tolerance the change by a larger one, which is about that many times
- * the error, but at events may be small by chance; at least that of one decade. */
-static void difference_measure_run (difference *x, int i) {
-  const double f = x->value[i];
-  double most = x->d->rtol * fabs (f);
-  for (int k = 0; k < LOOSE; k++) {
-    double change = fabs (x->loose[k * x->d->outputs + i] - f);
-    most = fmax (most, isnan (change) && isfinite (f) ? INFINITY : change / loose[k] * loose[0]);
-  }
-  x->run_error[i] = most;
-}
-
-/* Starts with two steps, together with the runs at x. */
+/* Starts with two steps, together with the runs at x.  The error of an output of a run: tolerance by tolerance the
+ * change by a larger one, which is about that many times the error, but at events may be small by chance; at least that
+ * of one decade. */
 static int difference_controlled (difference *x) {
   const int steering = x->d->steering > 0 ? x->d->steering : x->d->outputs;
   for (int j = 0; j < x->d->parameters; j++)
     for (int k = 0, found = 0; k <= FINEST && found < 2; k++) found += difference_want (&x->parameter[j], FIRST + k, 0);
   int status = difference_evaluate (x);
-  for (int i = 0; i < x->d->outputs && status == PW_OK; i++) difference_measure_run (x, i);
+  for (int i = 0; i < x->d->outputs && status == PW_OK; i++) {
+    const double f = x->value[i];
+    x->run_error[i] = x->d->rtol * fabs (f);
+    for (int k = 0; k < LOOSE; k++) {
+      double change = fabs (x->loose[k * x->d->outputs + i] - f);
+      x->run_error[i] =
+          fmax (x->run_error[i], isnan (change) && isfinite (f) ? INFINITY : change / loose[k] * loose[0]);
+    }
+  }
   for (int more = 1; more && status == PW_OK;) {
     more = 0;
     for (int j = 0; j < x->d->parameters; j++) {
@@ -474,22 +447,6 @@ int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, doubl
   return status;
 }
 
-/* ---- The method of the runs ---- */
-
-/* The steps of a run with the tolerance 1e-6, of which it may try at most `most`; INFINITY if it fails.  PW_OK,
- * PW_STOPPED or PW_RESOURCE. */
-static int difference_steps (const pw_system *s, const char *method, const pw_settings *settings, double t_end,
-                             long most, double *steps, pw_error *error) {
-  pw_settings own = *settings;
-  own.rtol = 1e-6, own.atol = 0, own.max_steps = most;
-  pw_run *r = pw_run_open (s, method, &own, error);
-  int status = r ? PW_OK : error->status;
-  while (status == PW_OK && pw_run_time (r) < t_end) status = pw_run_advance (r, t_end, error);
-  *steps = status == PW_OK ? (double)pw_run_statistics (r)->steps : INFINITY;
-  pw_run_close (r);
-  return status == PW_STOPPED || status == PW_RESOURCE ? status : PW_OK;
-}
-
 const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, long *most_steps,
                                 pw_error *error) {
   static const char *const method[] = { "erk8+projection", "radau" };
@@ -497,12 +454,18 @@ const char *pw_accurate_method (const pw_system *s, const pw_settings *settings,
   const double few = 2000, ratio = 20; /* a step of radau costs as much as 2 to 10 of erk8; it has a lower order */
   const double more = 200; /* steps at 1e-12 over those at 1e-6: 6 by erk8, 16 by radau, and more at neighbours */
   pw_error own[2] = { 0 };
-  double steps[2] = { INFINITY, INFINITY };
+  double steps[2] = { INFINITY, INFINITY }; /* of a run with the tolerance 1e-6; INFINITY: it fails */
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
   for (int i = 0; i < 2 && !(steps[0] < few); i++) {
-    int status = difference_steps (s, method[i], settings, t_end, most[i], &steps[i], &own[i]);
+    pw_settings at = *settings;
+    at.rtol = 1e-6, at.atol = 0, at.max_steps = most[i];
+    pw_run *r = pw_run_open (s, method[i], &at, &own[i]);
+    int status = r ? PW_OK : own[i].status;
+    while (status == PW_OK && pw_run_time (r) < t_end) status = pw_run_advance (r, t_end, &own[i]);
+    if (status == PW_OK) steps[i] = (double)pw_run_statistics (r)->steps;
+    pw_run_close (r);
     if (status == PW_RESOURCE) pw_fail (error, PW_RESOURCE, "%s", own[i].text);
-    if (status != PW_OK) return NULL;
+    if (status == PW_RESOURCE || status == PW_STOPPED) return NULL;
   }
   const int best = ratio * steps[1] < steps[0];
   *most_steps = (long)fmin (more * (steps[best] + 1000), 1e9);

@@ -31,8 +31,6 @@
 #include "util.h"
 #include "rank.h"
 
-/* ---- Derivatives ---- */
-
 /* Adds the derivatives with respect to q and v, by rows: (J^T lambda)_q - f_q and -f_v; gamma_q - (J a)_q and gamma_v;
  * B and 0. */
 static void linear_put (pw_linearisation *x, const double *v) {
@@ -83,8 +81,6 @@ void pw_linear_vary (pw_linearisation *x) {
   pw_saddle_solve (x->r->saddle, x->da, x->product + x->n, x->da, x->scratch);
 }
 
-/* ---- Bases ---- */
-
 /* Column j of Q without those of the unturned angles. */
 static double *linear_column (const pw_linearisation *x, int j) {
   return x->Q + (size_t)(x->unturned + j) * (size_t)x->n;
@@ -95,17 +91,6 @@ static void linear_independent_rows (pw_linearisation *x) {
   size_t n = (size_t)x->n;
   pw_rank_rows (x->r->w, x->R, x->norm);
   for (int k = 0; k < x->rank; k++) memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * n, n * sizeof *x->R);
-}
-
-/* The smallest singular value of the independent rows of J; NaN: no rows, or LAPACK failed. */
-static double linear_least (pw_linearisation *x) {
-  int n = x->n, rank = x->rank;
-  double least = INFINITY;
-  linear_independent_rows (x);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, linear_column (x, 0), n,
-                                            x->row_scratch, 0, NULL, 1, x->scratch, n + x->m + 3) != 0;
-  for (int k = 0; k < rank; k++) least = fmin (least, x->scratch[0] * x->row_scratch[k]);
-  return rank && !failed ? least : NAN;
 }
 
 void pw_linear_bases (pw_linearisation *x) {
@@ -121,27 +106,19 @@ void pw_linear_bases (pw_linearisation *x) {
   LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, x->unturned + rank, x->Q, n, tau, x->scratch, n);
 }
 
-/* ---- The reduced system ---- */
-
-/* dv -= J^+ B dq, with B dq in `product`: solves R^T b = B dq, dv -= Q b. */
-static void linear_follow (pw_linearisation *x) {
-  double *b = x->row_scratch;
-  const int stride = x->rank > 1 ? x->rank : 1; /* LAPACK refuses 0 */
-  for (int i = 0; i < x->rank; i++) b[i] = x->product[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
-  LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
-  for (int i = 0; i < x->rank; i++)
-    for (int j = 0; j < x->n; j++) x->dx[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_length_factor (x->r->s, j);
-}
-
 void pw_linear_tangent (pw_linearisation *x, int c) {
   int velocity = c >= x->positions, column = velocity ? x->rank + c - x->positions : x->holonomic + c;
-  double T = x->r->w->scale.time;
+  double T = x->r->w->scale.time, *b = x->row_scratch;
+  const int stride = x->rank > 1 ? x->rank : 1; /* LAPACK refuses 0 */
   memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   for (int j = 0; j < x->n; j++)
     x->dx[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_length_factor (x->r->s, j) / (velocity ? T : 1);
   if (velocity && x->r->s->feedback == 0) return;
-  linear_multiply (x);
-  linear_follow (x);
+  linear_multiply (x); /* dv -= J^+ B dq: solves R^T b = B dq, dv -= Q b */
+  for (int i = 0; i < x->rank; i++) b[i] = x->product[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
+  LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
+  for (int i = 0; i < x->rank; i++)
+    for (int j = 0; j < x->n; j++) x->dx[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_length_factor (x->r->s, j);
 }
 
 /* Component of a vector over the coordinates along a column of Q. */
@@ -171,8 +148,6 @@ void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in
     out[j + 1] = s * in[j] + c * in[j + 1];
   }
 }
-
-/* ---- Opening ---- */
 
 static int linear_arrays (pw_linearisation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = (size_t)x->size;
@@ -219,13 +194,11 @@ void pw_linear_close (pw_linearisation *x) {
   free (x->memory);
 }
 
-/* ---- The co-moving frame ----
- *
- * In a frame with the origin r, the velocity u and the angular velocity w, a body at (x, y) with the velocity v is at
- * rest if v = u + w (-(y - r_y), x - r_x), and its acceleration is W v = w (-v_y, v_x, 0).  A motion relative to the
- * frame with constant velocity d is also steady if the equations do not depend on it: the spin of a balanced rotor,
- * bodies that drift apart.  In a rotating frame d rotates with it unless it belongs to an angle, so W d counts as an
- * acceleration. */
+/* The co-moving frame.  In a frame with the origin r, the velocity u and the angular velocity w, a body at (x, y) with
+ * the velocity v is at rest if v = u + w (-(y - r_y), x - r_x), and its acceleration is W v = w (-v_y, v_x, 0).  A
+ * motion relative to the frame with constant velocity d is also steady if the equations do not depend on it: the spin
+ * of a balanced rotor, bodies that drift apart.  In a rotating frame d rotates with it unless it belongs to an angle,
+ * so W d counts as an acceleration. */
 
 /* Residuals are dimensionless; accelerations in units of L / T^2, angles times L.
  *
@@ -303,8 +276,6 @@ static void linear_choose_frame (pw_linearisation *x) {
   pw_linear_frame f = linear_fit (x);
   if (x->frame.residual > LINEAR_EXACT && f.residual < x->frame.residual / 2) x->frame = f;
 }
-
-/* ---- Symmetries of the whole ---- */
 
 /* dx = the variation by a rigid displacement of the whole: by L along x (k = 0) or y (1), or by 1 rad about the frame's
  * origin (2). */
@@ -387,8 +358,6 @@ static int linear_symmetries (pw_linearisation *x) {
   }
   return symmetries == PW_METHOD ? 0 : symmetries;
 }
-
-/* ---- Steadiness ---- */
 
 /* The state to which a steady motion leads after a time: rotated with the frame about its origin, which has moved along
  * an arc.  Angles, internal coordinates, and all coordinates if the frame does not rotate, continue at constant
@@ -480,8 +449,6 @@ static pw_steadiness linear_steady (pw_linearisation *x) {
   return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;
 }
 
-/* ---- Inputs and mode shapes ---- */
-
 /* Inputs, states and mode shapes of a linearisation.
  *
  * A signal of a force changes the accelerations by the solution of the saddle-point system with the right-hand side
@@ -494,17 +461,6 @@ static pw_steadiness linear_steady (pw_linearisation *x) {
  * not unique. */
 static const double MODES_APART = 1e-6;
 
-/* The column of B of signal u of element e of a batch, whose force_u is evaluated in the scratch block. */
-static void modes_input (pw_linearisation *x, const pw_element_batch *k, int e, int u, double *column) {
-  const int signals = k->kind->signals, cols = k->b.cols;
-  memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
-  memset (x->da, 0, ((size_t)x->n + 3) * sizeof *x->da);
-  memset (x->row_scratch, 0, (size_t)x->m * sizeof *x->row_scratch);
-  for (int c = 0; c < cols; c++) x->da[pw_global (k, e, c)] += x->tangent.block[(e * cols + c) * signals + u];
-  pw_saddle_solve (x->r->saddle, x->da, x->row_scratch, x->da, x->scratch);
-  pw_linear_coordinates (x, x->dx, x->da, x->r->s->sources, column);
-}
-
 /* Fills B, column by column; NAN for signals of constraints. */
 static void modes_inputs (pw_linearisation *x, double *B) {
   pw_workspace *w = x->r->w;
@@ -512,13 +468,19 @@ static void modes_inputs (pw_linearisation *x, double *B) {
   for (int i = 0; i < x->r->s->limit_sources; i++, B++) /* none is reached, or there is no linearisation */
     for (int c = 0; c < x->size; c++) B[c * inputs] = 0;
   for (pw_element_batch *k = w->batch; k < w->batch + x->r->s->batches; k++) {
-    if (k->kind->signals == 0) continue;
-    if (k->kind->force_u) k->kind->force_u (&k->b, x->tangent.block);
-    for (int i = 0; i < k->b.count * k->kind->signals; i++, B++)
-      if (k->kind->force_u)
-        modes_input (x, k, i / k->kind->signals, i % k->kind->signals, B);
-      else
-        for (int c = 0; c < x->size; c++) B[c * inputs] = NAN;
+    const int signals = k->kind->signals, cols = k->b.cols;
+    if (signals && k->kind->force_u) k->kind->force_u (&k->b, x->tangent.block);
+    for (int i = 0; i < k->b.count * signals; i++, B++) {
+      const int e = i / signals, u = i % signals;
+      for (int c = 0; c < x->size; c++) B[c * inputs] = NAN;
+      if (k->kind->force_u == NULL) continue;
+      memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
+      memset (x->da, 0, ((size_t)x->n + 3) * sizeof *x->da);
+      memset (x->row_scratch, 0, (size_t)x->m * sizeof *x->row_scratch);
+      for (int c = 0; c < cols; c++) x->da[pw_global (k, e, c)] += x->tangent.block[(e * cols + c) * signals + u];
+      pw_saddle_solve (x->r->saddle, x->da, x->row_scratch, x->da, x->scratch);
+      pw_linear_coordinates (x, x->dx, x->da, inputs, B);
+    }
   }
 }
 
@@ -537,18 +499,15 @@ static int modes_matrices (pw_linearisation *x, pw_linear *l) {
   return PW_OK;
 }
 
-/* 1 if mu is about an eigenvalue of the k rigid displacements: +- i w for two translations, 0 for any other one. */
-static int modes_near_rigid (const pw_linearisation *x, int k, double complex mu) {
-  double bound = MODES_APART / x->r->w->scale.time, w = x->frame.twist[2];
-  return (k != 2 && cabs (mu) <= bound) || (k >= 2 && (cabs (mu - I * w) <= bound || cabs (mu + I * w) <= bound));
-}
-
-/* Sets the first k entries of y, y1, from the others, y2; 0 if they are not unique. */
+/* Sets the first k entries of y, y1, from the others, y2; 0 if they are not unique: if mu is about an eigenvalue of the
+ * k rigid displacements, +- i w for two translations, 0 for any other one. */
 static void modes_rigid_part (const pw_linearisation *x, int k, double complex mu, double complex *y) {
   double complex M[9];
   int pivot[3];
+  double bound = MODES_APART / x->r->w->scale.time, w = x->frame.twist[2];
   for (int i = 0; i < k; i++) y[i] = 0;
-  if (k == 0 || modes_near_rigid (x, k, mu)) return;
+  if (k == 0 || (k != 2 && cabs (mu) <= bound)) return;
+  if (k >= 2 && (cabs (mu - I * w) <= bound || cabs (mu + I * w) <= bound)) return;
   for (int i = 0; i < k; i++)
     for (int c = 0; c < x->size; c++)
       if (c < k)
@@ -556,15 +515,6 @@ static void modes_rigid_part (const pw_linearisation *x, int k, double complex m
       else
         y[i] -= x->upper_rows[i * x->size + c] * y[c];
   LAPACKE_zgesv_work (LAPACK_COL_MAJOR, k, 1, M, k, pivot, y, k);
-}
-
-/* Sets y, after its first k entries, to the eigenvector j of A22.  LAPACK has computed its conjugate, a left
- * eigenvector of A22^T, since A22 is stored by rows. */
-static void modes_vector (const pw_linearisation *x, int k, int j, double complex *y) {
-  int n = x->size - k;
-  double im = x->left_vectors[n * n + j];
-  const double *re = x->left_vectors + (size_t)(im < 0 ? j - 1 : j) * (size_t)n;
-  for (int i = 0; i < n; i++) y[k + i] = im == 0 ? re[i] : re[i] - I * (im > 0 ? re[n + i] : -re[n + i]);
 }
 
 /* Transforms y to minimal coordinates by the reflections in x->symmetry. */
@@ -589,15 +539,17 @@ static void modes_scale (const pw_linearisation *x, double complex *shape) {
   for (int j = 0; cabs (most) > 0 && j < 2 * x->n; j++) shape[j] /= most;
 }
 
-/* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted. */
+/* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted.  Of an eigenvector
+ * of A22 LAPACK has computed the conjugate, a left eigenvector of A22^T, since A22 is stored by rows. */
 static int modes_shapes (pw_linearisation *x, int k, pw_linear *l) {
-  int size = x->size, states = 2 * x->n;
+  int size = x->size, states = 2 * x->n, n = size - k;
   double complex *y = malloc (((size_t)size + 1) * sizeof *y);
   if (y == NULL) return PW_RESOURCE;
   for (int i = k; i < size; i++) {
     if (l->re[i] == 0 && l->im[i] == 0) continue;
     double complex *shape = (double complex *)l->shape + (size_t)i * (size_t)states;
-    modes_vector (x, k, i - k, y);
+    const double im = x->left_vectors[n * n + i - k], *re = x->left_vectors + (im < 0 ? i - k - 1 : i - k) * n;
+    for (int j = 0; j < n; j++) y[k + j] = im == 0 ? re[j] : re[j] - I * (im > 0 ? re[n + j] : -re[n + j]);
     modes_rigid_part (x, k, l->re[i] + I * l->im[i], y);
     modes_reflect (x, k, y);
     for (int j = 0; j < states; j++)
@@ -607,8 +559,6 @@ static int modes_shapes (pw_linearisation *x, int k, pw_linear *l) {
   free (y);
   return PW_OK;
 }
-
-/* ---- Eigenvalues, with uncertain parts set to 0 ---- */
 
 /* EIGEN_ROUND_OFF: size of the perturbations that estimate the uncertainty of eigenvalues, relative to the largest
  * entry of each row; then, after balancing, of the matrix: a hundred times round-off, lost in derivatives and QR
@@ -654,18 +604,6 @@ static void eigen_shift (int n, const double *re, const double *im, double *re2,
   }
 }
 
-/* Sets real and imaginary parts below their uncertainty to 0, the same for both eigenvalues of a pair. */
-static void eigen_clean (int n, double *re, double *im, const double *shift) {
-  for (int i = 0, pair; i < n; i += 1 + pair) {
-    pair = im[i] > 0;
-    double uncertain = EIGEN_CERTAIN * fmax (shift[i], shift[i + pair]);
-    for (int k = i; k <= i + pair; k++) {
-      if (!(fabs (re[k]) > uncertain)) re[k] = 0;
-      if (!(fabs (im[k]) > uncertain)) im[k] = 0;
-    }
-  }
-}
-
 /* The eigenvalues of B; those of the perturbed matrix give their uncertainty.  B has room for 2 n^2 + 7 n entries. */
 static int eigen_certain (const pw_linearisation *x, int n, double *B, double *re, double *im) {
   int cells = n * n, unused, also_unused;
@@ -680,7 +618,14 @@ static int eigen_certain (const pw_linearisation *x, int n, double *B, double *r
   eigen_perturb (n, most, perturbed);
   if (eigen_values (n, perturbed, re2, im2, NULL, work) != PW_OK) return PW_RETRY;
   eigen_shift (n, re, im, re2, im2, EIGEN_ROUND_OFF * most, shift);
-  eigen_clean (n, re, im, shift);
+  for (int i = 0, pair; i < n; i += 1 + pair) { /* uncertain parts become 0, the same for both eigenvalues of a pair */
+    pair = im[i] > 0;
+    double uncertain = EIGEN_CERTAIN * fmax (shift[i], shift[i + pair]);
+    for (int k = i; k <= i + pair; k++) {
+      if (!(fabs (re[k]) > uncertain)) re[k] = 0;
+      if (!(fabs (im[k]) > uncertain)) im[k] = 0;
+    }
+  }
   return PW_OK;
 }
 
@@ -753,8 +698,6 @@ static int eigen_all (pw_linearisation *x, pw_linear *l, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: the eigenvalues of the linearisation cannot be computed", x->r->t);
 }
 
-/* ---- RK4 ---- */
-
 /* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, z = h (re + i im): a region within |z| < 4 (Hairer & Wanner 1996, section
  * IV.2).  For a growing solution only its frequency counts. */
 static int rk4_stable (double re, double im, double h) {
@@ -777,8 +720,6 @@ double pw_rk4_limit (double re, double im) {
   }
   return low;
 }
-
-/* ---- Linearisation of a run ---- */
 
 /* In units of the scene: two changes of a state, and the least change of the accelerations that counts as a jump. */
 static const double LINEAR_FAR = 1e-6, LINEAR_NEAR = 1e-8, LINEAR_JUMP = 1e-6;
@@ -827,7 +768,10 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
                       : pw_run_annotate_error (r, pw_fail_signal (r->t, error), error);
   status = pw_events_check_modes (r, r->v, x->lambda, error);
   if (status != PW_OK) return status;
-  l->least = linear_least (x);
+  linear_independent_rows (x); /* l->least: their smallest singular value, NaN if there are none, or LAPACK failed */
+  if (x->rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', x->n, x->rank, linear_column (x, 0), x->n,
+                                      x->row_scratch, 0, NULL, 1, x->scratch, x->n + x->m + 3) == 0)
+    for (int k = 0; k < x->rank; k++) l->least = fmin (l->least, x->scratch[0] * x->row_scratch[k]);
   pw_linear_bases (x);
   int jump = linear_jump (x);
   if (pw_system_may_jump (r->s)) (void)pw_linear_evaluate (x, r->t, r->q, r->v);

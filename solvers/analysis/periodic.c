@@ -49,8 +49,6 @@ static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
     RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
     RETURN_MOVED = 1e-6; /* least distance that counts as motion, in units of the scene */
 
-/* ---- The period of signals ---- */
-
 /* The period of a signal [s]; 0: none, or not known. */
 static double signal_period (const pw_signal *s) {
   if (s->type == PW_PULSE) return s->pulse.height != 0 ? s->pulse.period : 0;
@@ -73,8 +71,6 @@ double pw_system_period (const pw_system *s) {
       period = common_period (period, signal_period (&s->batch[k].source[i].signal));
   return period;
 }
-
-/* ---- The motion over one period, with its derivatives with respect to the initial state ---- */
 
 /* Least relative tolerances.  Derivatives, of which differences of runs have two thirds of the digits, need fewer than
  * states: Newton's method converges all the same. */
@@ -294,8 +290,6 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
   return PW_RETRY;
 }
 
-/* ---- Where the search begins ---- */
-
 /* Sets y to the canonical state of a run at time t (pw_steady_canonical), and *distance to its distance from x->y0
  * in units of the scene. */
 static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
@@ -348,8 +342,6 @@ static int flow_settle (pw_periodic *x, double value, int periods) {
   if (status == PW_STOPPED) pw_fail (&x->why, PW_METHOD, "stopped");
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
 }
-
-/* ---- Equations ---- */
 
 /* Speed along the orbit, after removal of symmetries, below which a motion is steady, in units of the scene. */
 static const double EQUATIONS_STEADY = 1e-4;
@@ -462,18 +454,6 @@ static void equations_shift (pw_periodic *x, int k) {
   pw_linear_turn (&x->steady->system.linearisation, symmetry[PW_RATE_TURN], x->y0 + n, x->change + n);
 }
 
-/* The conditions that corrections are orthogonal to these directions. */
-static void equations_orthogonal (pw_periodic *x, int rows, double *dF) {
-  int states = 2 * x->n;
-  for (int k = 0; k < x->symmetries + x->settings.free; k++) {
-    double sum = 0;
-    equations_shift (x, k);
-    for (int j = 0; j < states; j++) sum += pow (x->change[j] / pw_periodic_unit (x, j), 2);
-    for (int j = 0; j < states && sum > 0; j++)
-      dF[j * rows + 2 * states + k] = x->change[j] / pw_periodic_unit (x, j) / sqrt (sum);
-  }
-}
-
 /* pw_branch_problem.evaluate.  The flow without derivatives comes last: the equations need its x->y0 to x->a1. */
 static int equations_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {
   pw_periodic *x = periodic;
@@ -490,11 +470,15 @@ static int equations_evaluate (void *periodic, const double *u, double *F, doubl
     by_period[j] = x->y1[x->n + j] * x->T / pw_periodic_unit (x, j);
     by_period[x->n + j] = x->a1[j] * x->T / pw_periodic_unit (x, x->n + j);
   }
-  equations_orthogonal (x, rows, dF);
+  for (int k = 0; k < x->symmetries + x->settings.free; k++) { /* corrections are orthogonal to shifts */
+    double sum = 0;
+    equations_shift (x, k);
+    for (int j = 0; j < states; j++) sum += pow (x->change[j] / pw_periodic_unit (x, j), 2);
+    for (int j = 0; j < states && sum > 0; j++)
+      dF[j * rows + 2 * states + k] = x->change[j] / pw_periodic_unit (x, j) / sqrt (sum);
+  }
   return PW_OK;
 }
-
-/* ---- Multipliers ---- */
 
 /* Minimal coordinates of a change of the initial state. */
 static void equations_coordinates (const pw_periodic *x, const double *change, double *out) {
@@ -515,17 +499,6 @@ static void equations_sort (int count, double *re, double *im) {
     }
 }
 
-/* The shifts in minimal coordinates, by columns of S.  Returns their number. */
-static int equations_shifts (pw_periodic *x, double *S) {
-  const int first = pw_steady_hidden_symmetries (x->steady); /* of the motion */
-  int k = 0;
-  for (; first + k < x->symmetries + x->settings.free && k < x->size; k++) {
-    equations_shift (x, first + k);
-    equations_coordinates (x, x->change, S + k * x->size);
-  }
-  return k;
-}
-
 /* The eigenvalues of the diagonal block from row `first` of x->monodromy, into x->re and x->im from entry `to`. */
 static int equations_block (pw_periodic *x, int first, int count, int to, double *block, double *work) {
   for (int c = 0; c < count; c++)
@@ -542,9 +515,13 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
  * fails; PW_RETRY with x->why: with a free period, the motion is steady.
  * In coordinates that begin with the shifts, the monodromy matrix is block triangular: the first block is trivial. */
 static int equations_multipliers (pw_periodic *x, const double *u, int *trivial) {
-  int n = x->n, size = x->size, lwork = PERIODIC_WORK * size;
+  int n = x->n, size = x->size, lwork = PERIODIC_WORK * size, k = 0;
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;
-  int k = *trivial = equations_shifts (x, S);
+  for (int shift = pw_steady_hidden_symmetries (x->steady); shift < x->symmetries + x->settings.free && k < size; k++) {
+    equations_shift (x, shift++);
+    equations_coordinates (x, x->change, S + k * size);
+  }
+  *trivial = k;
   pw_steady_combine (x->steady, u + 2 * n, 1, x->work);
   if (size == 0) return PW_OK;
   for (int c = 0; c < size; c++) {
@@ -562,8 +539,6 @@ static int equations_multipliers (pw_periodic *x, const double *u, int *trivial)
   int status = equations_block (x, k, size - k, 0, S, work);
   return status == PW_OK ? equations_block (x, 0, k, size - k, S, work) : status;
 }
-
-/* ---- Opening ---- */
 
 /* pw_branch_problem.same: up to symmetries, but not up to a shift in time. */
 static int periodic_same (void *periodic, const double *u, const double *other) {
@@ -700,8 +675,6 @@ int pw_periodic_symmetries (const pw_periodic *x) {
   return x ? x->symmetries - pw_steady_hidden_symmetries (x->steady) : 0;
 }
 
-/* ---- Motions ---- */
-
 /* PW_RETRY if forces depend on the number of whole turns of a body: then the accelerations do not repeat. */
 static int periodic_turns (pw_periodic *x) {
   double off = 0, most = 0;
@@ -717,7 +690,6 @@ static int periodic_turns (pw_periodic *x) {
   return PW_RETRY;
 }
 
-/* The motion of u, with its multipliers. */
 static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *out, pw_error *error) {
   int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, error);
   if (status == PW_OK) status = equations_multipliers (x, u, &out->trivial);
@@ -736,16 +708,6 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   return PW_OK;
 }
 
-/* Sets x->u to the unknowns at x->state. */
-static void periodic_set_unknowns (pw_periodic *x, double parameter) {
-  int unknowns = pw_periodic_unknowns (x);
-  memset (x->u, 0, ((size_t)unknowns + 1) * sizeof *x->u);
-  for (int j = 0; j < 2 * x->n; j++) x->u[j] = x->state[j] / pw_periodic_unit (x, j);
-  if (x->settings.free) x->u[unknowns - 1] = x->last_period / x->T;
-  if (x->settings.last != x->settings.first)
-    x->u[unknowns] = (parameter - x->settings.first) / (x->settings.last - x->settings.first);
-}
-
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
@@ -756,7 +718,12 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
   int status = flow_settle (x, parameter, settle);
   if (status < 0) return pw_fail (error, status, "%s", x->why.text);
   if (status != PW_OK) return status;
-  periodic_set_unknowns (x, parameter);
+  const int unknowns = pw_periodic_unknowns (x);
+  memset (x->u, 0, ((size_t)unknowns + 1) * sizeof *x->u);
+  for (int j = 0; j < 2 * x->n; j++) x->u[j] = x->state[j] / pw_periodic_unit (x, j);
+  if (x->settings.free) x->u[unknowns - 1] = x->last_period / x->T;
+  if (x->settings.last != x->settings.first)
+    x->u[unknowns] = (parameter - x->settings.first) / (x->settings.last - x->settings.first);
   x->steps = 0;
   status = equations_guess_displacement (x, x->u, error);
   if (status != PW_OK) return status;
@@ -767,8 +734,6 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
   out->iterations = x->branch.iterations;
   return status;
 }
-
-/* ---- Branches ---- */
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;

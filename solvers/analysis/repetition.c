@@ -35,7 +35,6 @@ struct pw_repetition {
   long recorded;
 };
 
-/* The settings of repetition 1 or 2. */
 static pw_settings repetition_settings (const pw_repetition *r, int number) {
   pw_settings x = r->settings;
   const double tolerance = r->coarse ? 10 : pow (10, -number);
@@ -112,18 +111,6 @@ const char *pw_repetition_text (const pw_repetition *r) {
   return !r->adaptive ? "half the step" : r->coarse ? "ten times the tolerance" : "a tenth of the tolerance";
 }
 
-/* ---- Differences ---- */
-
-/* The range of a column in the first rows. */
-static double repetition_range (const double *rows, long count, int width, int column) {
-  double least = INFINITY, largest = -INFINITY;
-  for (long k = 0; k < count; k++) {
-    least = fmin (least, rows[k * width + column]);
-    largest = fmax (largest, rows[k * width + column]);
-  }
-  return largest - least;
-}
-
 /* The largest difference of a column in the rows from `from` on. */
 static double repetition_difference (const double *a, const double *b, long from, long count, int width, int column) {
   double most = 0;
@@ -145,9 +132,13 @@ static double repetition_relative (const pw_repetition *r, const double *a, cons
     const char *unit = pw_system_state_unit (r->s, i);
     const double size = (*unit == 'm' ? r->scale.length : 1) / (i < n ? 1 : r->scale.time);
     double range = STILL * size, d = repetition_difference (a, b, 0, count, r->width, PW_RECORD_STATES + i);
-    for (int j = 0; j < 2 * n; j++)
-      if (strcmp (pw_system_state_unit (r->s, j), unit) == 0)
-        range = fmax (range, repetition_range (a, count, r->width, PW_RECORD_STATES + j));
+    for (int j = 0; j < 2 * n; j++) {
+      double least = INFINITY, largest = -INFINITY;
+      if (strcmp (pw_system_state_unit (r->s, j), unit) != 0) continue;
+      for (const double *x = a + PW_RECORD_STATES + j, *last = x + count * r->width; x < last; x += r->width)
+        least = fmin (least, *x), largest = fmax (largest, *x);
+      range = fmax (range, largest - least);
+    }
     if (!(d <= most * range)) most = d / range, *state = i;
   }
   return most;
@@ -176,11 +167,6 @@ static int repetition_converges (pw_repetition *r, const double *rows, long coun
                   name, before, unit, pw_repetition_text (r), after, unit, r->adaptive ? "tolerance" : "step");
 }
 
-/* The time, constraint residuals, energy of projections and balance, which have no error that this could state. */
-static int repetition_is_residual (int column) {
-  return column < 3 || column == PW_RECORD_STATES - 2 || column == PW_RECORD_STATES - 1;
-}
-
 int pw_repetition_error (pw_repetition *r, const double *rows, long count, double *end, double *largest,
                          pw_error *error) {
   const double factor = SAFETY[r->adaptive];
@@ -191,8 +177,9 @@ int pw_repetition_error (pw_repetition *r, const double *rows, long count, doubl
   for (int i = 0; status == PW_OK && i < r->width; i++) {
     double least = 0;
     end[i] = largest[i] = NAN;
-    if (repetition_is_residual (i) || (i >= PW_RECORD_STATES && pw_system_state_hidden (r->s, i - PW_RECORD_STATES)))
-      continue;
+    /* the time, constraint residuals, energy of projections and balance have no error that this could state */
+    if (i < 3 || i == PW_RECORD_STATES - 2 || i == PW_RECORD_STATES - 1) continue;
+    if (i >= PW_RECORD_STATES && pw_system_state_hidden (r->s, i - PW_RECORD_STATES)) continue;
     for (long k = 0; k < count; k++) least = fmax (least, ROUND_OFF * fabs (rows[k * r->width + i]));
     end[i] = least + factor * repetition_difference (rows, r->first, count - 1 - count / LAST, count, r->width, i);
     largest[i] = least + factor * repetition_difference (rows, r->first, 0, count, r->width, i);

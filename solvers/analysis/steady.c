@@ -37,8 +37,6 @@ static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in u
     SUGGEST_CHANGE = 1e-8,  /* a quantity is worth holding if the square of its change along the family, without the */
     SUGGEST_LEFT = 1e-6;    /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
 
-/* ---- Whether signals change with time, or repeat after a period ---- */
-
 enum { SIGNAL_TIMES = 16 };             /* times at which signals are compared, and as many between breakpoints */
 static const double SIGNAL_SAME = 1e-8; /* largest difference of equal signals, relative to their largest value */
 
@@ -68,26 +66,24 @@ static int signals_compare (signal_comparison *x, int number, double t0, double 
   return number > 0 ? PW_OK : status;
 }
 
-/* The middle between the first two breakpoints after *t, or the first one and t1; INFINITY without one before t1.
- * Moves *t to the first one. */
-static double signals_next_interval (pw_workspace *w, double *t, double t1) {
-  *t = pw_next_breakpoint (w, 1, *t);
-  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
-}
-
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
   signal_comparison x = { .r = r, .count = 3 * r->s->sources };
   size_t count = (size_t)x.count;
-  double at = t, breakpoint = t;
+  double at = t, breakpoint = t, end = t + span;
   int status = PW_OK;
   x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
   if (x.values == NULL) return pw_fail_memory (r->s, error);
   x.largest = x.values + count, x.difference = x.largest + count, x.state = x.difference + count;
   for (int k = 1; status == PW_OK && k <= 2 * SIGNAL_TIMES && isfinite (at); k++) {
     double part = k / (double)SIGNAL_TIMES;
-    at = k > SIGNAL_TIMES ? signals_next_interval (r->w, &breakpoint, t + span)
-         : period > 0     ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
-                          : t + span * part * part;               /* denser at first */
+    at = period > 0 ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
+                    : t + span * part * part;           /* denser at first */
+    if (k >
+        SIGNAL_TIMES) { /* the middle between the first two breakpoints after the last one, or the first one and end */
+      breakpoint = pw_next_breakpoint (r->w, 1, breakpoint);
+      at = breakpoint < end ? breakpoint + (fmin (pw_next_breakpoint (r->w, 1, breakpoint), end) - breakpoint) / 2
+                            : INFINITY;
+    }
     for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
       status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
   }
@@ -97,8 +93,6 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
   free (x.values);
   return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
 }
-
-/* ---- The system and its run at a value of the parameter ---- */
 
 const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why) {
   const pw_system *s = x->described;
@@ -128,15 +122,6 @@ static void steady_close_system (pw_steady_system *x) {
   memset (x, 0, sizeof *x);
 }
 
-/* Makes the system that is open for a value of the parameter x->system; if there is none, the oldest one. */
-static void steady_find_system (pw_steady *x, double value) {
-  int i = 0;
-  while (i < PW_STEADY_RECENT - 1 && !(x->recent[i].run && x->recent[i].value == value)) i++;
-  const pw_steady_system found = x->recent[i];
-  memmove (x->recent + 1, x->recent, (size_t)i * sizeof found);
-  x->recent[0] = x->system, x->system = found;
-}
-
 /* Opens a run at the last solution, which is not made consistent for other values of the parameter; or if there is none
  * or that fails, consistent, or at rest in its configuration. */
 static int steady_open_run (pw_steady *x, const pw_system *s) {
@@ -159,7 +144,11 @@ static int steady_open_run (pw_steady *x, const pw_system *s) {
  * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
 static int steady_open_system (pw_steady *x, double value) {
   if (x->system.run && (x->parametric.compile == NULL || x->system.value == value)) return PW_OK;
-  steady_find_system (x, value);
+  int i = 0; /* of the recent system with this value, or the oldest one, which changes places with the present one */
+  while (i < PW_STEADY_RECENT - 1 && !(x->recent[i].run && x->recent[i].value == value)) i++;
+  const pw_steady_system found = x->recent[i];
+  memmove (x->recent + 1, x->recent, (size_t)i * sizeof found);
+  x->recent[0] = x->system, x->system = found;
   if (x->system.run && x->system.value == value) return PW_OK;
   steady_close_system (&x->system);
   x->why = (pw_error){ 0 };
@@ -170,8 +159,6 @@ static int steady_open_system (pw_steady *x, double value) {
   if (status != PW_OK) steady_close_system (&x->system);
   return status == PW_OK || status == PW_RESOURCE || refused ? status : PW_RETRY;
 }
-
-/* ---- Unknowns ---- */
 
 /* Numbers of unknowns, without the parameter, and of equations. */
 static int steady_unknowns (const pw_steady *x) {
@@ -221,8 +208,6 @@ static int steady_nearest (pw_steady *x, const double *q, const double *v, doubl
   memcpy (u + n, right, (size_t)columns * sizeof *u);
   return PW_OK;
 }
-
-/* ---- Residuals ---- */
 
 /* The unit of the residual of an equation: INFINITY if it is not enforced, since its reaction is at a limit. */
 static double steady_row_unit (const pw_steady *x, int i) {
@@ -320,8 +305,6 @@ static int steady_evaluate (void *steady, const double *u, double *F, double *dF
   return PW_OK;
 }
 
-/* ---- Singular constraints ---- */
-
 /* Evaluates the rows of J at u, of length 1 (m x n); active (m, or NULL): 1 for independent ones. */
 static int steady_rows (pw_steady *x, const double *u, double *rows, unsigned char *active, pw_error *error) {
   int status = steady_open_system (x, steady_parameter (x, u));
@@ -379,8 +362,6 @@ static int steady_check_step (void *steady, const double *from, const double *to
   free (A);
   return status;
 }
-
-/* ---- Where the search begins: the initial state, states that forces lead to, random states ---- */
 
 enum { START_STEPS = 300 };               /* of a relaxation, at most */
 static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
@@ -451,8 +432,6 @@ static int steady_start (pw_steady *x, int attempt, double *u, pw_error *error) 
   return PW_OK;
 }
 
-/* ---- Opening ---- */
-
 int pw_check_search (double first, double last, int points, pw_error *error) {
   if (!isfinite (first) || !isfinite (last))
     return pw_fail (error, PW_INPUT, "settings first = %g, last = %g: expected finite numbers", first, last);
@@ -517,7 +496,6 @@ static int steady_constant (pw_steady *x, pw_error *error) {
       x->s->model, name);
 }
 
-/* Stores the initial state and scales at the first value of the parameter. */
 static int steady_begin (pw_steady *x, pw_error *error) {
   if (steady_open_system (x, x->settings.first) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   const pw_run *r = x->system.run;
@@ -546,15 +524,6 @@ static int steady_symmetries (pw_steady *x, int may_change, pw_error *error) {
   return status == PW_OK ? PW_OK : pw_fail (error, x->why.status, "%s", x->why.text);
 }
 
-/* Holds the velocities of angles that nothing turns, which they keep. */
-static void steady_hold_unturned (pw_steady *x) {
-  for (int j = 0; j < x->n; j++) {
-    int held = !pw_is_unturned (x->s, j);
-    for (int i = 0; i < x->settings.holds; i++) held |= x->hold[i].state == x->n + j;
-    if (!held) x->hold[x->settings.holds++] = (pw_initial_value){ .state = x->n + j, .value = x->start[x->n + j] };
-  }
-}
-
 static int steady_open_branch (pw_steady *x, pw_error *error) {
   const pw_branch_problem problem = { .unknowns = steady_unknowns (x),
                                       .equations = steady_equations (x),
@@ -581,7 +550,12 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
                       s->model, x->n, STEADY_MAX_COORDINATES);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK) status = steady_begin (x, error);
-  if (status == PW_OK && !may_change) steady_hold_unturned (x);
+  for (int j = 0; j < x->n && status == PW_OK && !may_change;
+       j++) { /* angles that nothing turns keep their velocities */
+    int held = !pw_is_unturned (s, j);
+    for (int i = 0; i < x->settings.holds; i++) held |= x->hold[i].state == x->n + j;
+    if (!held) x->hold[x->settings.holds++] = (pw_initial_value){ .state = x->n + j, .value = x->start[x->n + j] };
+  }
   if (status == PW_OK) status = steady_symmetries (x, may_change, error);
   if (status == PW_OK) status = steady_open_branch (x, error);
   if (status == PW_OK) return x;
@@ -631,8 +605,6 @@ const char *pw_steady_reason (const pw_steady *x) {
 int pw_steady_symmetries (const pw_steady *x) {
   return x ? x->symmetries - pw_steady_hidden_symmetries (x) : 0;
 }
-
-/* ---- Solutions ---- */
 
 /* The motion of the unknowns u, which become x->solution, with its linearisation; sets x->neutral.  A status. */
 static int steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
@@ -736,26 +708,21 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   return status == PW_OK ? steady_motion_at (x, x->u, out, error) : status;
 }
 
-/* ---- Suggestions ---- */
-
-/* The change of a quantity along direction i of the family, in units of the scene; if `relative` is 1, the
- * change of an angle less that of the angle of the first body. */
-static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
-  const double *z = x->null_space + (size_t)i * (size_t)steady_unknowns (x);
-  double *dq = x->dq, *dv = x->dv;
-  pw_steady_combine (x, z + x->n, x->T, x->combined);
-  pw_steady_velocities (x, x->combined, x->q, dv);
-  for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
-  pw_linear_turn (&x->system.linearisation, x->rates[PW_RATE_TURN], dq, dv);
-  return pw_hold_residual (x, hold, dq, dv) - (relative ? dq[2] : 0);
-}
-
 /* Whether holding a quantity makes the family smaller.  `basis` has `count` orthonormal rows of length `family`, the
- * changes of what is held already along the family; that of this quantity becomes the next row. */
+ * changes of what is held already along its directions, in units of the scene; that of this quantity becomes the next
+ * row.  relative: 1: the change of an angle less that of the angle of the first body. */
 static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relative, int family, double *basis,
                           int count) {
   double *row = basis + count * family, left = 0, whole = 0; /* squares */
-  for (int i = 0; i < family; i++) row[i] = suggest_change (x, hold, relative, i), whole += row[i] * row[i];
+  const double *z = x->null_space;
+  for (int i = 0; i < family; i++, z += steady_unknowns (x)) {
+    pw_steady_combine (x, z + x->n, x->T, x->combined);
+    pw_steady_velocities (x, x->combined, x->q, x->dv);
+    for (int j = 0; j < x->n; j++) x->dq[j] = z[j] * pw_unit (x->s, j);
+    pw_linear_turn (&x->system.linearisation, x->rates[PW_RATE_TURN], x->dq, x->dv);
+    row[i] = pw_hold_residual (x, hold, x->dq, x->dv) - (relative ? x->dq[2] : 0);
+    whole += row[i] * row[i];
+  }
   for (int k = 0; k < count; k++) {
     double dot = 0;
     for (int i = 0; i < family; i++) dot += row[i] * basis[k * family + i];
@@ -804,8 +771,6 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
   free (basis);
   return count;
 }
-
-/* ---- Branches ---- */
 
 static const double BRANCH_MIN_STEP = 1e-7, /* in scaled unknowns; the range of the parameter is 1 */
     BRANCH_ACCURACY = 1e-9;                 /* of events, relative to the step */

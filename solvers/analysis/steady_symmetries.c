@@ -99,21 +99,18 @@ void pw_steady_displace (const pw_steady *x, const double *rates, double time, d
     if (pw_is_angle (x->s, j)) q[j] += time * rates[pw_steady_angle_rate (x->s, j)];
 }
 
-/* Displaces the whole at x->q, x->v irregularly, by up to pi and `distance` units of length along x and y. */
-static void symmetry_displace (pw_steady *x, double distance, int number) {
-  memset (x->combined, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *x->combined);
-  for (int i = PW_RATE_X; i <= PW_RATE_TURN; i++)
-    x->combined[i] = (i == PW_RATE_TURN ? PW_PI : distance) * pw_irregular (0.9 + number, 1 + i);
-  pw_steady_displace (x, x->combined, 1, x->q, x->v);
-}
-
 /* Evaluates derivatives at state `number` in general position, but on the constraints: off them residuals rotate with
  * the whole.  near: greatest distance of a state from the initial one, or from that after a displacement. */
 static int symmetry_evaluate (pw_steady *x, double near, int number) {
   pw_run *r = x->system.run;
   pw_projector p;
+  const double far =
+      pow (3, number - SYMMETRY_NEAR); /* by which the whole is displaced along x and y; it turns by pi */
   pw_irregular_state (r, near, number, x->q, x->v);
-  if (number >= SYMMETRY_NEAR) symmetry_displace (x, pow (3, number - SYMMETRY_NEAR), number);
+  memset (x->combined, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *x->combined);
+  for (int i = PW_RATE_X; i <= PW_RATE_TURN; i++)
+    x->combined[i] = (i == PW_RATE_TURN ? PW_PI : far) * pw_irregular (0.9 + number, 1 + i);
+  if (number >= SYMMETRY_NEAR) pw_steady_displace (x, x->combined, 1, x->q, x->v);
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
@@ -215,7 +212,6 @@ static int symmetry_restrict (pw_steady *x, int rows, double *M) {
   return PW_OK;
 }
 
-/* Adds the asymmetries at state `number`. */
 static int symmetry_add_state (pw_steady *x, int number, int rows, double *M) {
   int status = symmetry_evaluate (x, SYMMETRY_DISTANCE, number);
   M += number * symmetry_length (x);
@@ -270,9 +266,6 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
   return x->free_symmetries < 0 ? x->free_symmetries : PW_OK;
 }
 
-/* ---- Comparison ---- */
-
-/* Whether a symmetry displaces the whole. */
 static int symmetry_of_whole (const double *symmetry) {
   return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
 }
@@ -280,7 +273,10 @@ static int symmetry_of_whole (const double *symmetry) {
 /* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns, if
  * possible one that turns as the whole, so that whole turns do not matter; if there is none, of the line to the last
  * body from the centre, or from the first body if the whole can be translated. */
-static double symmetry_angle (const pw_steady *x, const double *turn, const double *centre, const double *q) {
+static double symmetry_angle (const pw_steady *x, const double *turn, const double *q) {
+  const double own[] = { x->origin[0] - x->L * turn[PW_RATE_Y] / turn[PW_RATE_TURN],
+                         x->origin[1] + x->L * turn[PW_RATE_X] / turn[PW_RATE_TURN] },
+               *centre = own;
   int rates = pw_steady_rate_count (x->s), last = 3 * (x->s->bodies - 1);
   double angle = NAN;
   for (int b = 0; b < x->s->bodies; b++) {
@@ -307,23 +303,16 @@ static double symmetry_time (const pw_steady *x, const double *rate, const doubl
   return square > 0 ? (rate[PW_RATE_X] * q[0] + rate[PW_RATE_Y] * q[1]) / (x->L * square) : 0;
 }
 
-/* Displaces a state back along a symmetry. */
-static void symmetry_go_back (const pw_steady *x, const double *rate, double *q, double *v) {
-  double turn = rate[PW_RATE_TURN], time = turn != 0 ? 0 : symmetry_time (x, rate, q);
-  if (turn != 0) {
-    double centre[2] = { x->origin[0] - x->L * rate[PW_RATE_Y] / turn, x->origin[1] + x->L * rate[PW_RATE_X] / turn };
-    time = symmetry_angle (x, rate, centre, q) / turn;
-  }
-  pw_steady_displace (x, rate, -time, q, v);
-}
-
 /* The whole is turned first, since this changes what the other symmetries change; these commute, and the pivot of each
  * is changed by it alone. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
   int rates = pw_steady_rate_count (x->s);
   for (int turns = 1; turns >= 0; turns--)
-    for (int k = 0; k < x->symmetries; k++)
-      if ((x->symmetry[k * rates + PW_RATE_TURN] != 0) == turns) symmetry_go_back (x, x->symmetry + k * rates, q, v);
+    for (const double *rate = x->symmetry; rate < x->symmetry + x->symmetries * rates; rate += rates) {
+      if ((rate[PW_RATE_TURN] != 0) != turns) continue;
+      const double time = turns ? symmetry_angle (x, rate, q) / rate[PW_RATE_TURN] : symmetry_time (x, rate, q);
+      pw_steady_displace (x, rate, -time, q, v);
+    }
 }
 
 void pw_steady_move_to_start (const pw_steady *x, double *q, double *v) {
