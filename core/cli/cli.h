@@ -237,6 +237,24 @@ typedef struct {
  * begins messages.  PW_INPUT. */
 int pw_cli_range (const char *option, const char *text, pw_range *range, pw_error *error);
 
+/* A varied quantity. */
+enum { PW_AXIS_VALUES = 11 /* of a range without COUNT */ };
+#define PW_AXIS_MOST 1e8 /* values of an axis, and rows of a grid: a journal needs 8 bytes of memory per row */
+typedef struct {
+  char *name;
+  char *text;                    /* of its values, "1:10:100" or "1,2,5", as written */
+  pw_range range;                /* without a list */
+  double *value;                 /* of a list; NULL: a range */
+  long count;                    /* number of values */
+  long stride;                   /* number of rows from one value to the next */
+  const pw_parameter *parameter; /* NULL: the initial value of a state; set by a sweep, like stride and unit */
+  const char *unit;
+} pw_axis;
+/* Reads "NAME=RANGE" or "NAME=V1,V2,..."; the arrays of the axis are in the arena.  PW_INPUT with the reason,
+ * PW_RESOURCE. */
+int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error);
+double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
+
 /* Settings except `ledger` and `specialised`, whose span is the final time, and limit of a run, from options and
  * defaults.  The limit must outlive the run. */
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,

@@ -223,6 +223,54 @@ int pw_cli_range (const char *option, const char *text, pw_range *range, pw_erro
   return PW_OK;
 }
 
+static int axis_fail (const pw_axis *axis, const char *why, pw_error *error) {
+  return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", axis->name, axis->text, why);
+}
+
+int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error) {
+  *axis = (pw_axis){ .name = pw_arena_copy (arena, text) };
+  if (axis->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  char *equals = strchr (axis->name, '=');
+  if (equals == NULL || equals == axis->name || equals[1] == 0)
+    return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=LOW:HIGH[:COUNT][:log] or a list NAME=V1,V2,...",
+                    text);
+  *equals = 0, axis->text = equals + 1;
+  if (axis->text[pw_cli_part (axis->text, ':')]) {
+    if (pw_cli_range ("--vary", text, &axis->range, error) != PW_OK) return error->status;
+    const int one = axis->range.low == axis->range.high;
+    axis->count = axis->range.count ? axis->range.count : one ? 1 : PW_AXIS_VALUES;
+    if ((double)axis->count > PW_AXIS_MOST) return axis_fail (axis, "too many values: at most 1e8 rows", error);
+    if (axis->count == 1 && !one)
+      return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
+    return PW_OK;
+  }
+  axis->count = 1;
+  for (const char *c = axis->text; c[pw_cli_part (c, ',')]; axis->count++) c += pw_cli_part (c, ',') + 1;
+  axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
+  if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const char *c = axis->text;
+  for (long i = 0; i < axis->count; i++, c += pw_cli_part (c, ',') + 1) {
+    const size_t size = pw_cli_part (c, ',');
+    const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
+    if (pw_read_expression (part, &axis->value[i]) != PW_OK || !isfinite (axis->value[i]))
+      return axis_fail (axis, PW_PRINTED (240, "\"%s\" is not a finite number%s", part, PW_NUMBER_HINT (part)), error);
+  }
+  return PW_OK;
+}
+
+/* The ends are exact.  Values between them are divided only once, so that they are rounded as little as possible: the
+ * fourth value of 0:1:11 is 0.3. */
+double pw_axis_value (const pw_axis *axis, long i) {
+  if (axis->value) return axis->value[i];
+  const double low = axis->range.low, high = axis->range.high, last = (double)(axis->count - 1), k = (double)i;
+  if (i == 0 || low == high) return low;
+  if (i == axis->count - 1) return high;
+  if (axis->range.logarithmic) return pow (10, (log10 (low) * (last - k) + log10 (high) * k) / last);
+  double value = (low * (last - k) + high * k) / last;
+  if (isfinite (value)) return value;
+  return low / last * (last - k) + high / last * k; /* the products were too large */
+}
+
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,
                      pw_error *error) {
   double max_steps = PW_MAX_STEPS;

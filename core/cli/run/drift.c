@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 #include "study.h"
-#include "sweep.h"
 
 #define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below it are round-off: they have no growth */
 enum { DRIFT_PARTS = 200, DRIFT_ROWS = 10000 }; /* parts of a run, each a point in the figures; rows at most */
