@@ -128,7 +128,7 @@ $(call obj,core/cli/page/page.c): $(BUILD)/obj/core/cli/page/page.inc
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/specialise/specialise.c): $(BUILD)/obj/core/specialise/source_texts.inc
-$(call obj,core/cli/parallel.c core/cli/run/sweep.c core/cli/run/run_error.c $(addprefix core/cli/analyse/,fit.c optimise.c)) $(BUILD)/pinwheel: private THREADS = -pthread
+$(call obj,core/cli/parallel.c core/cli/run/sweep.c core/cli/run/run_command.c $(addprefix core/cli/analyse/,fit.c optimise.c)) $(BUILD)/pinwheel: private THREADS = -pthread
 # Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE = $(addprefix -iquote tests/,support faults solvers) $(ALL) $(SYSTEM)

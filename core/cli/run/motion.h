@@ -63,22 +63,4 @@ int pw_motion_unit (const pw_system *system, int state);
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
                               pw_error *error);
 
-/* ---- A run compared with a reference ---- */
-
-typedef struct {
-  pw_motion reference, motion; /* at the same times; `motion` is that of the run; without a reference, no times */
-  pw_reference_error errors;
-  char gaps[MOTION_GAPS]; /* pw_motion_gaps of the reference in any sample */
-} pw_comparison;
-
-/* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution
- * unless --start changes the initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
-int pw_comparison_open (pw_comparison *comparison, const pw_cli_line *line, const char *path, double t_end,
-                        pw_error *error);
-void pw_comparison_close (pw_comparison *comparison);
-/* Saves the samples taken in a checkpoint, or loads them from one. */
-void pw_comparison_serialise (pw_comparison *comparison, pw_archive *a);
-/* The errors of the samples taken, after the run; NULL if there are none. */
-const pw_reference_error *pw_comparison_errors (pw_comparison *comparison, const pw_system *system);
-
 #endif

@@ -4,12 +4,510 @@
  * time is measured. */
 #include <float.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include "report.h"
-#include "run_command.h"
+#include "motion.h"
+#include "outcome.h"
+#include "pinwheel-analysis.h"
+#include "plot.h"
+
+typedef struct {
+  /* as given, or NULL; without --checkpoint, `path` is that of --resume */
+  const char *path, *interval_text, *resume_path;
+  /* as understood */
+  double interval;       /* simulated time between two checkpoints [s]; 0: there are none */
+  double next_time;      /* of the next checkpoint [s]; INFINITY: never */
+  const char *last_path; /* of the last one, resumed or saved; NULL: none */
+  double last_time;      /* its time [s] */
+  pw_text fingerprint;   /* of this run: the head of its checkpoints */
+  pw_archive state;      /* of the next checkpoint */
+  pw_checkpoint resumed; /* the checkpoint from which the run continues */
+  pw_output *lock;       /* FILE.part, empty, which locks out other processes during the whole run */
+} pw_checkpoints;
+
+/* `--error`: the repetition of the run, in a thread of its own. */
+typedef struct {
+  double t[MOTION_SAMPLES]; /* at which the runs are compared [s] */
+  int taken;                /* rows of the run stored so far */
+  int width;                /* numbers of a row */
+  double *rows, *end;       /* those of the run; the errors at the end, and the largest ones, after them */
+  pw_repetition *repetition;
+  pw_settings settings;
+  pw_limit limit;       /* of the repetition */
+  atomic_int cancelled; /* 1: the run has ended early */
+  pthread_t thread;
+  int started; /* 1: the thread has not been joined */
+  int status;  /* of the repetition */
+  pw_error failure;
+  int known; /* 1: `result` is */
+  char unknown[40 + sizeof (pw_error)];
+  pw_stated_error result;
+} pw_error_run;
+
+/* A run and a reference solution. */
+typedef struct {
+  pw_motion reference, motion; /* at the same times; `motion` is that of the run; without a reference, no times */
+  pw_reference_error errors;
+  char gaps[MOTION_GAPS]; /* pw_motion_gaps of the reference in any sample */
+} pw_comparison;
+
+enum { PW_RUN_TABLE, PW_RUN_PAGE, PW_RUN_SUMMARY, PW_RUN_OUTPUTS };
+
+typedef struct pw_run_cli {
+  /* as given */
+  pw_cli_line line;
+  const char *row_interval_text; /* --every */
+  const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
+  const char **of;               /* ended by NULL; or NULL */
+  int with_energies, with_error; /* 1: --energy, --error */
+  pw_checkpoints checkpoints;
+  /* as understood */
+  pw_cli_engine engine;
+  const char *method;
+  pw_settings settings;
+  pw_limit limit;
+  double row_interval; /* of the table [s]; 0: each accepted step is a row */
+  /* open */
+  pw_output *output[PW_RUN_OUTPUTS]; /* NULL: not written */
+  pw_csv *table;
+  pw_plots *plots;
+  pw_comparison comparison;
+  pw_error_run stated;
+  pw_outcomes outcomes; /* --of and --until; its system is NULL without them */
+  pw_run *run;
+  const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
+  pw_progress progress;
+  /* in progress */
+  int has_outputs;             /* 1: the run is complete, and the values of --of are known */
+  long rows;                   /* written to the table */
+  int limited;                 /* 1: --limit, --max-steps or a signal during a step has stopped the run */
+  int loaded;                  /* 1: the state of the checkpoint has been loaded */
+  long batch;                  /* calls of pw_run_advance_towards between updates of the progress, at most */
+  double cpu;                  /* processor time of the method [s] */
+  double stepping, counted[2]; /* time in steps since, and real and processor time when `cpu` was counted [s] */
+  int write_failed;            /* 1: the table or the summary could not be written */
+  char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
+} pw_run_cli;
+
+/* The time at which the results end: that of --until, or that reached. */
+static double run_end_time (const pw_run_cli *command) {
+  return command->outcomes.ended ? command->outcomes.t : pw_run_time (command->run);
+}
+
+/* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution
+ * unless --start changes the initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
+static int comparison_open (pw_comparison *comparison, const pw_cli_line *line, const char *path, double t_end,
+                            pw_error *error) {
+  *comparison = (pw_comparison){ .errors = { .source = path ? path : "the model" } };
+  if (path == NULL && !pw_model_has_reference (line->m.model)) return PW_OK;
+  if (path == NULL && line->starts) {
+    pw_cli_say (
+        "pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "
+        "computed\n");
+    return PW_OK;
+  }
+  int status = pw_motion_open_reference (&comparison->reference, &line->m, path, &t_end, error);
+  if (status != PW_OK) return status;
+  pw_motion_gaps (line->m.system, &comparison->reference, 1, comparison->gaps);
+  return pw_motion_open_at (&comparison->motion, line->m.system, &comparison->reference, error);
+}
+
+static void comparison_close (pw_comparison *comparison) {
+  pw_motion_close (&comparison->reference);
+  pw_motion_close (&comparison->motion);
+}
+
+/* Saves the samples taken in a checkpoint, or loads them from one. */
+static void comparison_serialise (pw_comparison *comparison, pw_archive *archive) {
+  pw_motion *motion = &comparison->motion;
+  int taken = motion->taken;
+  if (motion->times == 0) return;
+  pw_archive_bytes (archive, &taken, sizeof taken);
+  if (taken < 0 || taken > motion->times) archive->failed = 1;
+  if (archive->failed) return;
+  motion->taken = taken;
+  pw_archive_bytes (archive, motion->value, (size_t)taken * (size_t)motion->width * sizeof *motion->value);
+}
+
+/* The errors of the samples taken, after the run; NULL if there are none. */
+static const pw_reference_error *comparison_errors (pw_comparison *comparison, const pw_system *system) {
+  double error[MOTION_ERRORS];
+  pw_motion *motion = &comparison->motion;
+  pw_reference_error *errors = &comparison->errors;
+  if (motion->taken == 0) return NULL;
+  pw_motion_errors (system, &comparison->reference, motion, error);
+  errors->samples = motion->taken;
+  errors->t = motion->t[motion->taken - 1];
+  memcpy (errors->end, error + MOTION_END, sizeof errors->end);
+  memcpy (errors->most, error + MOTION_LARGEST, sizeof errors->most);
+  errors->reactions = error[MOTION_MULTIPLIERS];
+  return errors;
+}
+
+enum { ERROR_BODIES = 20, ERROR_COLUMNS = 24, ERROR_WIDTH = 12, ERROR_DIGITS = 2 };
+
+static int error_stop (void *context) {
+  pw_error_run *e = context;
+  return e->cancelled || pw_limit_over (&e->limit);
+}
+
+static void *error_repeat (void *argument) {
+  pw_error_run *e = argument;
+  pw_limit_start (&e->limit);
+  e->status = pw_repetition_run (e->repetition, 0, &e->failure);
+  if (e->status == PW_STOPPED) pw_fail (&e->failure, PW_STOPPED, "stopped by %s", pw_stop ? "a signal" : "--limit");
+  return NULL;
+}
+
+/* Starts the repetition, if there is --error; the run is open. */
+static int error_start (pw_run_cli *command, pw_error *error) {
+  pw_error_run *e = &command->stated;
+  if (!command->with_error) return PW_OK;
+  if (command->checkpoints.resume_path)
+    return pw_fail (error, PW_INPUT,
+                    "--error compares the run from its beginning on: it cannot be combined with --resume");
+  pw_equal_times (command->settings.span, MOTION_SAMPLES, e->t);
+  e->settings = command->settings, e->limit = command->limit;
+  e->settings.stop = error_stop, e->settings.stop_context = e;
+  e->width = pw_run_record_width (command->run);
+  e->repetition =
+      pw_repetition_open (command->line.m.system, command->method, &e->settings, e->t, MOTION_SAMPLES, error);
+  if (e->repetition == NULL) return error->status;
+  e->rows = calloc ((MOTION_SAMPLES + 2) * (size_t)e->width, sizeof *e->rows);
+  if (e->rows == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  e->result = (pw_stated_error){ .columns = e->width, .name = pw_system_record_name };
+  e->end = e->rows + MOTION_SAMPLES * e->width;
+  e->result.end = e->end, e->result.largest = e->end + e->width;
+  e->started = pthread_create (&e->thread, NULL, error_repeat, e) == 0;
+  return e->started ? PW_OK : pw_fail (error, PW_RESOURCE, "a thread for --error cannot be started");
+}
+
+/* The time of the next sample; INFINITY: there is none. */
+static double error_next (const pw_error_run *e) {
+  return e->started && e->taken < MOTION_SAMPLES ? e->t[e->taken] : INFINITY;
+}
+
+/* Stores the next sample of the run, whose last step contains its time. */
+static int error_add (pw_error_run *e, pw_run *run, pw_error *error) {
+  long recorded;
+  const int k = e->taken++;
+  return pw_run_record (run, e->t[k], e->t + k, 1, 0, e->rows + k * e->width, &recorded, error);
+}
+
+/* Ends the repetition, and states the error if the run is complete.  PW_RESOURCE. */
+static int error_finish (pw_error_run *e, int complete, pw_error *error) {
+  if (!e->started) return PW_OK;
+  e->cancelled = !complete;
+  pthread_join (e->thread, NULL);
+  e->started = 0;
+  if (!complete) return PW_OK;
+  pw_error reason = e->failure;
+  int status = e->status, repeated = status == PW_OK;
+  if (repeated) status = pw_repetition_error (e->repetition, e->rows, e->taken, e->end, e->end + e->width, &reason);
+  if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "%s", reason.text);
+  e->result.t = e->t[e->taken - 1];
+  e->result.repeated = pw_repetition_text (e->repetition);
+  e->known = 1;
+  if (status == PW_OK) return PW_OK;
+  snprintf (e->unknown, sizeof e->unknown, "%s%s", repeated ? "" : "the repetition failed: ",
+            status == PW_STOPPED && repeated ? "a second repetition was stopped" : reason.text);
+  e->result.unknown = e->unknown;
+  return PW_OK;
+}
+
+static void error_close (pw_error_run *e) {
+  error_finish (e, 0, &(pw_error){ 0 });
+  pw_repetition_close (e->repetition);
+  free (e->rows);
+}
+
+/* Stated errors of the bodies at the end; those of x and y are the error of a length. */
+static void error_bodies (const pw_stated_error *e, const pw_system *s, FILE *f) {
+  static const char *const head[] = { "body", "position [m]", "phi [rad]", "velocity [m/s]", "omega [rad/s]", NULL };
+  const int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
+  for (pw_table table = { .f = f }; pw_table_pass (&table);) {
+    pw_head (&table, -5, ERROR_WIDTH, head);
+    for (int b = 0; b < bodies && b < ERROR_BODIES; b++) {
+      const double *q = e->end + PW_RECORD_STATES + 3 * b, *v = q + n;
+      pw_cell (&table, -5, pw_system_body_name (s, b));
+      for (int i = 0; i < 4; i++)
+        pw_cell_number (&table, ERROR_WIDTH,
+                        i % 2 ? (i < 2 ? q : v)[2] : hypot ((i < 2 ? q : v)[0], (i < 2 ? q : v)[1]), ERROR_DIGITS);
+      pw_row_end (&table);
+    }
+  }
+  pw_report_more (f, bodies - ERROR_BODIES, ": --json FILE has them all");
+}
+
+/* The largest errors of the other columns of the table: energies, contact points, reactions, ledger. */
+static void error_columns (const pw_stated_error *e, const pw_system *s, int energies, FILE *f) {
+  const int n = pw_system_coordinates (s), first = PW_RECORD_STATES, end = first + 3 * n;
+  int shown = 0, all = 0;
+  fprintf (f, "  largest error of a column\n");
+  for (pw_table table = { .f = f }; pw_table_pass (&table);) {
+    shown = all = 0;
+    for (int i = 0; i < e->columns; i++) {
+      const int is_state = i >= first + n && pw_system_state_hidden (s, i - first - n);
+      if (isnan (e->largest[i]) || (first <= i && i < end && !is_state) || (i < first && !energies)) continue;
+      if (++all > ERROR_COLUMNS) continue;
+      shown++;
+      pw_cell (&table, -8, PW_NAME (pw_system_record_name, s, i));
+      pw_cell_number (&table, ERROR_WIDTH, e->largest[i], ERROR_DIGITS);
+      pw_cell (&table, -1, pw_system_record_unit (s, i));
+      pw_row_end (&table);
+    }
+  }
+  pw_report_more (f, all - shown, ": --json FILE has them all");
+}
+
+/* The stated errors: of the bodies at the end, the largest of the other columns; or why they are unknown. */
+static void report_stated (const pw_run_cli *command, FILE *f) {
+  const pw_stated_error *e = &command->stated.result;
+  if (!command->stated.known) return;
+  if (e->unknown) {
+    pw_cli_print (f, "\n  the error is unknown: %s\n", e->unknown);
+    return;
+  }
+  pw_cli_print (f, "\n  stated error at %s s, from a repetition with %s\n", PW_DIGITS (e->t, 6), e->repeated);
+  error_bodies (e, command->line.m.system, f);
+  error_columns (e, command->line.m.system, command->with_energies, f);
+}
+
+enum {
+  REPORT_ROWS = 24,   /* reactions, or internal coordinates, that are printed at most */
+  REPORT_EVENTS = 10, /* listed */
+  REPORT_WIDTH = 13,  /* of a column of numbers */
+  REPORT_DIGITS = 8
+};
+#define REPORT_DEFECT 0.01 /* relative energy defect above which a warning is printed */
+
+/* Options without effect, tables that do not cover the run, long fixed steps, an absolute tolerance within which a
+ * force saturates. */
+static void report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
+                             const pw_settings *settings) {
+  double step = fmin (settings->step, settings->span), time_scale = pw_run_scale (run)->time;
+  pw_cli_report_unused (method, line);
+  pw_cli_report_tables (system, settings->span);
+  const int adaptive = pw_cli_adaptive (line->methods, method) == 1;
+  char element[PW_NAME_BYTES];
+  double saturation;
+  int state = adaptive && settings->atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
+  if (state >= 0 && settings->atol > saturation)
+    pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
+                "iteration reduce the tolerance of the states that the force depends on, others may be wrong\n",
+                PW_DIGITS (settings->atol, 3), PW_DIGITS (saturation, 3), pw_system_state_unit (system, state),
+                element);
+  if (!adaptive && step > time_scale)
+    pw_cli_say (
+        "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
+        "compare with shorter ones\n",
+        PW_DIGITS (step, 3), PW_DIGITS (time_scale, 2));
+}
+
+static void report_value (pw_table *table, int width, const char *name, double value, const char *unit) {
+  pw_cell (table, width, name);
+  pw_cell_number (table, REPORT_WIDTH, value, REPORT_DIGITS);
+  pw_cell (table, -1, unit);
+}
+
+static void report_internal (const pw_system *system, const pw_sample *last) {
+  int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
+  int end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
+  for (pw_table table = { 0 }; pw_table_pass (&table);)
+    for (int j = first; j < end; j++) {
+      for (int state = pw_system_state_hidden (system, j) ? j + n : j; state < 2 * n; state += n)
+        report_value (&table, -1, PW_NAME (pw_system_state_name, system, state), state < n ? last->q[j] : last->v[j],
+                      pw_system_state_unit (system, state));
+      pw_row_end (&table);
+    }
+  pw_report_more (stdout, n - end, "");
+}
+
+/* Reactions, which are -lambda (0 - lambda is never -0); or outputs. */
+static void report_list (const pw_system *s, const pw_sample *last, int outputs) {
+  const int count = outputs ? pw_system_outputs (s) : pw_system_rows (s);
+  if (count > 0) puts (outputs ? "\n  output" : "\n  reaction");
+  for (pw_table table = { 0 }; pw_table_pass (&table);)
+    for (int i = 0; i < count && i < REPORT_ROWS; i++) {
+      report_value (&table, -8, outputs ? pw_system_output_name (s, i) : PW_NAME (pw_system_reaction_name, s, i),
+                    outputs ? last->output[i] : 0 - last->lambda[i],
+                    outputs ? pw_system_output_unit (s, i) : pw_system_reaction_unit (s, i));
+      pw_row_end (&table);
+    }
+  pw_report_more (stdout, count - REPORT_ROWS, ": -o FILE.csv writes them all");
+}
+
+static void report_energy (const pw_sample *last) {
+  const struct {
+    const char *name;
+    double value;
+  } row[] = { { "kinetic", last->kinetic }, { "potential", last->potential },   { "work", last->work },
+              { "dissipated", last->loss }, { "projection", last->projection }, { "balance", last->balance } };
+  printf ("\n  energy\n");
+  for (pw_table table = { 0 }; pw_table_pass (&table);)
+    for (int i = 0; i < 6; i++) {
+      report_value (&table, -10, row[i].name, row[i].value, "J");
+      pw_row_end (&table);
+    }
+}
+
+/* A row of errors, unless both are unknown. */
+static void report_error (pw_table *table, const char *name, double end, double largest, const char *unit) {
+  if (isnan (end) && isnan (largest)) return;
+  pw_cell (table, -10, name);
+  pw_cell_number (table, REPORT_WIDTH, end, 3);
+  pw_cell_number (table, REPORT_WIDTH, largest, 3);
+  pw_cell (table, -1, unit);
+  pw_row_end (table);
+}
+
+/* The errors of a run, NULL without a reference, and what this does not contain (pw_motion_gaps); states: number of
+ * first-order states, whose errors count as those of speeds. */
+static void report_errors (const pw_reference_error *errors, const char *gaps, int states) {
+  const char *const name[] = { "length", "angle", states ? "speed, state" : "speed", "rate" };
+  const char *const unit[] = { "m", "rad", states ? "" : "m/s", "rad/s" };
+  if (errors == NULL) return;
+  int known = !isnan (errors->reactions);
+  for (int i = 0; i < 4; i++) known |= !isnan (errors->most[i]);
+  if (!known) {
+    pw_cli_print (stdout,
+                  "\n  errors are unknown: the reference solution of %s contains no value at the times compared\n",
+                  errors->source);
+    return;
+  }
+  const char *at = PW_PRINTED (40, "at %s s", PW_DIGITS (errors->t, 6));
+  pw_cli_print (stdout, "\n  error against the reference solution of %s, at %s\n", errors->source,
+                PW_COUNTED (errors->samples, "time"));
+  for (pw_table table = { 0 }; pw_table_pass (&table);) {
+    pw_head (&table, -10, REPORT_WIDTH, (const char *const[]){ "", at, "largest", NULL });
+    for (int i = 0; i < 4; i++) report_error (&table, name[i], errors->end[i], errors->most[i], unit[i]);
+    report_error (&table, "reactions", NAN, errors->reactions, "of the largest");
+  }
+  if (*gaps) pw_cli_print (stdout, "  the reference solution contains %s\n", gaps);
+}
+
+/* The element of a constraint equation; of an element with several, the reaction: "rolling-wheel rear.B". */
+static char *report_equation (const pw_system *system, int row, char *buffer, size_t size) {
+  const pw_element_info element = pw_system_element (system, pw_system_row_element (system, row));
+  if (element.kind->rows == 1) return pw_system_row_name (system, row, buffer, size);
+  return pw_print (buffer, size, "%s %s", element.kind->name, PW_NAME (pw_system_reaction_name, system, row));
+}
+
+/* The last events; of a scene without limits nothing. */
+static void report_events (const pw_system *system, const pw_summary *summary) {
+  const int first = summary->events > REPORT_EVENTS ? summary->events - REPORT_EVENTS : 0;
+  const pw_method *method;
+  if (pw_system_limited (system) == 0) return;
+  if (pw_method_parse (summary->method, NULL, &method, NULL, NULL) == PW_OK && method->locates_no_events) {
+    pw_cli_print (stdout, "  %s locates no events: reactions with limits are means over steps\n", method->name);
+    return;
+  }
+  pw_cli_print (stdout, "  %s%s\n", PW_COUNTED (summary->events, "event"), first > 0 ? "; the last ones:" : "");
+  for (const pw_event *e = summary->event + first; e < summary->event + summary->events; e++)
+    pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15), PW_NAME (report_equation, system, e->row),
+                  pw_system_mode_name (system, e->row, e->to),
+                  e->impact ? PW_PRINTED (60, ", impulse %s", PW_DIGITS (e->impulse, 8)) : "");
+}
+
+/* Why the general engine was used; "": it was not. */
+static const char *report_general_reason (const pw_run_cli *command) {
+  if (command->engine.code == NULL) return command->engine.reason;
+  if (pw_run_statistics (command->run)->specialised) return "";
+  return "the method, its options or redundant drives do not permit specialised code";
+}
+
+enum { PW_RUN_REASON = 80 };
+/* The summary of a run that ended with this error, if any; last: the last sample, or NULL; `reason` receives the text
+ * of an interruption. */
+static pw_summary run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
+                               char reason[PW_RUN_REASON]) {
+  const pw_file *file = command->line.m.file;
+  const pw_run *run = command->run;
+  pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
+                         .method = command->method,
+                         .status = pw_cli_status_word (error->status),
+                         .reason = error->text,
+                         .cpu = command->cpu,
+                         .until = command->outcomes.system ? command->line.until : NULL,
+                         .stop_time = command->outcomes.ended ? command->outcomes.t : NAN,
+                         .of = command->of,
+                         .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
+                         .redundant = command->redundant,
+                         .general = run ? report_general_reason (command) : NULL,
+                         .reference = run ? comparison_errors (&command->comparison, command->line.m.system) : NULL,
+                         .stated = command->stated.known ? &command->stated.result : NULL };
+  for (int i = 0; i < command->outcomes.outcomes; i++)
+    command->outcomes.value[i] = command->has_outputs ? pw_outcome_value (&command->outcomes, i) : NAN;
+  summary.of_value = command->outcomes.value;
+  if (run) summary.event = pw_run_events (run, &summary.events);
+  if (error->status == PW_OK && pw_stop) {
+    snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
+    summary.status = "interrupted";
+    summary.reason = reason;
+  }
+  return summary;
+}
+
+/* After the run: a relative energy defect of more than 1 % (NaN: not known), steps that did not resolve a
+ * change. */
+static void report_warnings (const pw_run *run, double defect) {
+  const pw_statistics *stats = pw_run_statistics (run);
+  if (defect > REPORT_DEFECT)
+    pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
+                PW_DIGITS (100 * defect, 2), pw_run_energy_advice (run, defect));
+  if (stats->unresolved > 0)
+    pw_cli_say ("pinwheel: %ld of %s did not resolve %s, which changes more within a step than the step sees: take "
+                "shorter steps, or a method with adaptive ones\n",
+                stats->unresolved, PW_COUNTED (stats->steps, "step"),
+                pw_run_unresolved (run, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES));
+}
+
+/* Prints the outputs of --of of a complete run, if any. */
+static void report_outputs (const pw_run_cli *command, FILE *f) {
+  char unit[60];
+  if (!command->has_outputs) return;
+  fputs ("\n  outputs\n", f);
+  for (pw_table table = { .f = f }; pw_table_pass (&table);)
+    for (int i = 0; i < command->outcomes.outcomes; i++) {
+      report_value (&table, -10, command->of[i], pw_outcome_value (&command->outcomes, i),
+                    pw_outcome_unit (&command->outcomes, i, unit, sizeof unit));
+      pw_row_end (&table);
+    }
+}
+
+/* Prints the last state, reactions, energies if they are asked for, errors, residuals and cost. */
+static void report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last) {
+  const pw_system *system = command->line.m.system;
+  const pw_statistics *stats = pw_run_statistics (command->run);
+  printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, PW_DIGITS (last->t, 8));
+  pw_print_bodies (system, last->q, last->v, "body", -5, REPORT_WIDTH, REPORT_DIGITS, 0);
+  pw_report_more (stdout, pw_system_bodies (system) - PW_BODIES_PRINTED, ": -o FILE.csv writes them all");
+  report_internal (system, last);
+  for (int outputs = 0; outputs < 2; outputs++) report_list (system, last, outputs);
+  if (command->with_energies) report_energy (last);
+  report_errors (summary->reference, command->comparison.gaps, pw_system_states (command->line.m.system));
+  printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
+          PW_DIGITS (stats->velocity, 2));
+  printf ("  %s, %ld rejected, %s, %s, %s, %s s of processor time\n", PW_COUNTED (stats->steps, "step"),
+          stats->rejected, PW_COUNTED (stats->rhs, "right-hand side"), PW_COUNTED (stats->jacobians, "Jacobian"),
+          PW_COUNTED (stats->factorisations, "factorisation"), PW_DIGITS (summary->cpu, 3));
+  if (*summary->general)
+    pw_cli_print (stdout, "  general engine: %s\n", summary->general);
+  else
+    printf ("  code specialised for this scene: %ld evaluations\n", stats->specialised);
+  report_events (system, summary);
+  if (stats->restarts > 0) printf ("  restarted at %s\n", PW_COUNTED (stats->restarts, "checkpoint"));
+  if (summary->until && isnan (summary->stop_time))
+    pw_cli_print (stdout, "  %s did not become true\n", summary->until);
+  else if (summary->until)
+    pw_cli_print (stdout, "  stopped: %s at t = %s s\n", summary->until, PW_DIGITS (summary->stop_time, 15));
+  if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
+}
 
 /* ---- Checkpoints: their contents, when they are due, and how a run continues from one ----
  *
@@ -123,7 +621,7 @@ static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
   pw_archive_bytes (archive, command->engine.reason, sizeof command->engine.reason);
   command->engine.reason[sizeof command->engine.reason - 1] = 0;
   if (command->plots) pw_plots_serialise (command->plots, archive);
-  pw_comparison_serialise (&command->comparison, archive);
+  comparison_serialise (&command->comparison, archive);
 }
 
 /* 1 if the checkpoint that was loaded lies within the run and has the rows up to its time. */
@@ -267,7 +765,7 @@ static int run_open (pw_run_cli *command, pw_error *error) {
       return error->status;
   }
   status =
-      pw_comparison_open (&command->comparison, &command->line, command->reference_path, command->settings.span, error);
+      comparison_open (&command->comparison, &command->line, command->reference_path, command->settings.span, error);
   if (status != PW_OK) return status;
   const char *follows = command->of ? "of" : command->line.until ? "until" : NULL;
   if (follows && command->with_error)
@@ -285,12 +783,12 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   if (command->run == NULL) return error->status;
   command->redundant = pw_report_redundancies (command->run);
   pw_report_model (&command->line.m);
-  pw_report_settings (command->run, system, command->method, &command->line, &command->settings);
+  report_settings (command->run, system, command->method, &command->line, &command->settings);
   pw_report_initialisation (command->run, system, command->redundant);
   pw_output *table = command->output[PW_RUN_TABLE];
   if (table && (command->table = pw_csv_open (system, command->with_energies, table, error)) == NULL)
     return error->status;
-  status = pw_error_run_start (command, error);
+  status = error_start (command, error);
   return status == PW_OK ? checkpoints_resume (command, error) : status;
 }
 
@@ -304,15 +802,11 @@ static double run_next_row_time (const pw_run_cli *command) {
   return t > 0 && fabs (t - command->settings.span) <= round_off ? command->settings.span : t;
 }
 
-static int run_is_stopped (const pw_run_cli *command) {
-  return command->outcomes.ended;
-}
-
 /* Writes rows and stores samples up to the time reached, or that at which --until ends the run, which has a row. */
 static int run_store_samples (pw_run_cli *command, pw_error *error) {
   pw_motion *motion = &command->comparison.motion;
   pw_run *run = command->run;
-  double now = pw_run_end_time (command);
+  double now = run_end_time (command);
   pw_sample sample;
   int status = PW_OK;
   while (status == PW_OK && run_next_row_time (command) <= now) {
@@ -323,7 +817,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
     pw_progress_at (&command->progress, sample.t);
     if (command->row_interval == 0) break;
   }
-  if (status == PW_OK && command->table && command->row_interval > 0 && run_is_stopped (command) &&
+  if (status == PW_OK && command->table && command->row_interval > 0 && command->outcomes.ended &&
       (double)(command->rows - 1) * command->row_interval < now) { /* the last row is not a multiple of the interval */
     status = pw_run_sample (run, now, &sample, error);
     if (status == PW_OK) status = pw_csv_write (command->table, command->line.m.system, &sample, error);
@@ -333,7 +827,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
     status = pw_run_sample (run, pw_plots_next (command->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (command->plots, &sample);
   }
-  if (status == PW_OK && command->plots && run_is_stopped (command)) {
+  if (status == PW_OK && command->plots && command->outcomes.ended) {
     status = pw_run_sample (run, now, &sample, error);
     if (status == PW_OK) pw_plots_last (command->plots, &sample);
   }
@@ -341,8 +835,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
     status = pw_run_sample (run, pw_motion_next_time (motion), &sample, error);
     if (status == PW_OK) pw_motion_add (motion, command->line.m.system, &sample);
   }
-  while (status == PW_OK && pw_error_run_next (&command->stated) <= now)
-    status = pw_error_run_add (&command->stated, run, error);
+  while (status == PW_OK && error_next (&command->stated) <= now) status = error_add (&command->stated, run, error);
   return status;
 }
 
@@ -350,7 +843,7 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   double due = fmin (command->checkpoints.next_time, command->settings.span);
   due = fmin (due, run_next_row_time (command));
   due = fmin (due, pw_motion_next_time (&command->comparison.motion));
-  due = fmin (due, pw_error_run_next (&command->stated));
+  due = fmin (due, error_next (&command->stated));
   if (command->plots) due = fmin (due, pw_plots_next (command->plots));
   double start = pw_seconds (CLOCK_MONOTONIC); /* read without a system call, unlike processor time */
   int status;
@@ -359,7 +852,7 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
     status = command->outcomes.system
                  ? pw_outcomes_advance (&command->outcomes, command->run, due, command->settings.span, error)
                  : pw_run_advance_towards (command->run, due, command->settings.span, error);
-    if (run_is_stopped (command)) break;
+    if (command->outcomes.ended) break;
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
   double seconds = pw_seconds (CLOCK_MONOTONIC) - start;
   command->stepping += seconds;
@@ -374,25 +867,21 @@ static void run_count_cpu (pw_run_cli *command) {
   command->stepping = 0, before[0] = now, before[1] = cpu;
 }
 
-static int run_save_checkpoint (pw_run_cli *command, pw_error *error) {
-  run_count_cpu (command);
-  int status = checkpoints_save (command, error);
-  run_count_cpu (command); /* without the time of writing */
-  return status;
-}
-
 static int run_steps (pw_run_cli *command, pw_error *error) {
   run_count_cpu (command);
   /* a checkpoint has the samples up to its time */
   pw_outcomes *outcomes = command->outcomes.system ? &command->outcomes : NULL;
   int status = outcomes ? pw_outcomes_begin (outcomes, command->run, command->settings.span, error) : PW_OK;
   if (status == PW_OK && !command->checkpoints.resume_path) status = run_store_samples (command, error);
-  while (status == PW_OK && !run_is_stopped (command) && pw_run_time (command->run) < command->settings.span &&
+  while (status == PW_OK && !command->outcomes.ended && pw_run_time (command->run) < command->settings.span &&
          !pw_stop) {
     status = run_batch (command, error);
     if (status == PW_OK) status = run_store_samples (command, error);
-    if (status == PW_OK && pw_run_time (command->run) >= command->checkpoints.next_time)
-      status = run_save_checkpoint (command, error);
+    if (status == PW_OK && pw_run_time (command->run) >= command->checkpoints.next_time) {
+      run_count_cpu (command);
+      status = checkpoints_save (command, error);
+      run_count_cpu (command); /* without the time of writing */
+    }
     pw_progress_at (&command->progress, pw_run_time (command->run));
   }
   run_count_cpu (command);
@@ -411,8 +900,8 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   command->progress.no_bar = run_is_stdout (command->table_path);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
-  int complete = status == PW_OK && (run_is_stopped (command) || pw_run_time (command->run) >= command->settings.span);
-  int stated = pw_error_run_finish (&command->stated, complete, error);
+  int complete = status == PW_OK && (command->outcomes.ended || pw_run_time (command->run) >= command->settings.span);
+  int stated = error_finish (&command->stated, complete, error);
   pw_stop_release ();
   if (complete && command->of) {
     stated = pw_outcomes_end (&command->outcomes, command->run, error);
@@ -501,14 +990,14 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   char reason[PW_RUN_REASON] = "";
   int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
-  if (run && pw_run_sample (run, pw_run_end_time (command), &sample, NULL) == PW_OK) last = &sample;
+  if (run && pw_run_sample (run, run_end_time (command), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (command, error->status == PW_OK && !interrupted, error);
-  pw_summary summary = pw_run_summary (command, last, error, reason);
-  if (last && command->table_path == NULL && command->summary_path == NULL) pw_report_end (command, &summary, last);
+  pw_summary summary = run_summary (command, last, error, reason);
+  if (last && command->table_path == NULL && command->summary_path == NULL) report_end (command, &summary, last);
   FILE *text = run_is_stdout (command->table_path) || run_is_stdout (command->summary_path) ? stderr : stdout;
-  pw_report_outputs (command, text);
-  pw_report_stated (command, text);
-  if (error->status == PW_OK) pw_report_warnings (run, summary.energy_defect);
+  report_outputs (command, text);
+  report_stated (command, text);
+  if (error->status == PW_OK) report_warnings (run, summary.energy_defect);
   int undrawn = run_finish_figures (command, summary.reason, error);
   if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
   if (undrawn && error->status == PW_OK) summary.status = "interrupted", summary.reason = "gnuplot was interrupted";
@@ -535,8 +1024,8 @@ static int run_command (void *options, pw_error *error) {
   pw_archive_free (&checkpoints->state);
   pw_checkpoint_free (&checkpoints->resumed);
   pw_plots_close (command->plots);
-  pw_comparison_close (&command->comparison);
-  pw_error_run_close (&command->stated);
+  comparison_close (&command->comparison);
+  error_close (&command->stated);
   pw_run_close (command->run);
   pw_outcomes_close (&command->outcomes);
   free (command->redundant);
