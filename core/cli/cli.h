@@ -376,12 +376,6 @@ int pw_cli_check_format (const pw_use *use, pw_error *error);
 /* Endings of formats, for pw_use. */
 extern const char *const pw_cli_csv[], *const pw_cli_json[], *const pw_cli_tables[];
 
-/* ---- JSON ---- */
-
-/* Writes items by a template such as "{name: %s, value: %g, list: [": %s a text or null, %g, %d and %ld a number, %i a
- * flag; a line end begins a line with the next item.  What is opened may be closed by another call. */
-void pw_json_print (pw_json *j, const char *format, ...) PW_PRINTF (2, 3);
-
 /* ---- Messages ---- */
 
 /* A number as text (pw_format), in a buffer that lives as long as the block around it. */

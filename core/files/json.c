@@ -1,6 +1,7 @@
 /* Writes JSON item by item, and the summary of a run. */
 #include <errno.h>
 #include <math.h>
+#include <stdarg.h>
 #include <string.h>
 #include "files.h"
 
@@ -72,6 +73,43 @@ void pw_json_numbers (pw_json *j, const char *key, const double *value, int coun
 
 void pw_json_flag (pw_json *j, const char *key, int value) {
   if (json_item (j, key)) fputs (value ? "true" : "false", j->f);
+}
+
+static void json_value (pw_json *j, const char *key, const char **at, va_list *arguments) {
+  const int is_long = (*at)[1] == 'l';
+  const char type = (*at)[1 + is_long];
+  *at += 2 + is_long;
+  if (type == 's')
+    pw_json_text (j, key, va_arg (*arguments, const char *));
+  else if (type == 'i')
+    pw_json_flag (j, key, va_arg (*arguments, int));
+  else if (type == 'g')
+    pw_json_number (j, key, va_arg (*arguments, double));
+  else
+    pw_json_number (j, key, is_long ? (double)va_arg (*arguments, long) : va_arg (*arguments, int));
+}
+
+void pw_json_print (pw_json *j, const char *format, ...) {
+  va_list arguments;
+  va_start (arguments, format);
+  for (const char *at = format; *(at += strspn (at, ", "));) {
+    char key[40];
+    const size_t n = strspn (at, "abcdefghijklmnopqrstuvwxyz0123456789_");
+    snprintf (key, sizeof key, "%.*s", (int)n, at);
+    if (n) at += n + strspn (at + n, ": ");
+    if (*at == '%') {
+      json_value (j, n ? key : NULL, &at, &arguments);
+      continue;
+    }
+    if (*at == '{' || *at == '[')
+      pw_json_open (j, n ? key : NULL, *at);
+    else if (*at != '\n')
+      pw_json_close (j, *at);
+    else if (j)
+      j->line = 1;
+    at++;
+  }
+  va_end (arguments);
 }
 
 static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
@@ -150,11 +188,8 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
 static void json_events (pw_json *j, const pw_summary *summary, const pw_system *s) {
   pw_json_open (j, "events", '[');
   for (const pw_event *e = summary->event; e < summary->event + summary->events; e++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "t", e->t);
-    pw_json_text (j, "reaction", PW_NAME (pw_system_reaction_name, s, e->row));
-    pw_json_text (j, "from", pw_system_mode_name (s, e->row, e->from));
-    pw_json_text (j, "to", pw_system_mode_name (s, e->row, e->to));
+    pw_json_print (j, "{t: %g, reaction: %s, from: %s, to: %s", e->t, PW_NAME (pw_system_reaction_name, s, e->row),
+                   pw_system_mode_name (s, e->row, e->from), pw_system_mode_name (s, e->row, e->to));
     if (e->impact) pw_json_number (j, "impulse", e->impulse);
     pw_json_close (j, '}');
   }
@@ -164,9 +199,7 @@ static void json_events (pw_json *j, const pw_summary *summary, const pw_system 
 static void json_reference (pw_json *j, const pw_reference_error *e) {
   static const char *const names[] = { "length", "angle", "speed", "rate" };
   if (!json_object (j, "truth", e)) return;
-  pw_json_text (j, "source", e->source);
-  pw_json_number (j, "samples", e->samples);
-  pw_json_number (j, "t", e->t);
+  pw_json_print (j, "source: %s, samples: %d, t: %g", e->source, e->samples, e->t);
   json_numbers (j, "end", names, e->end, 4);
   json_numbers (j, "largest", names, e->most, 4);
   pw_json_number (j, "reactions", e->reactions);
@@ -183,9 +216,7 @@ static void json_errors (pw_json *j, const char *key, const pw_system *s, const 
 
 static void json_stated (pw_json *j, const pw_system *s, const pw_stated_error *e) {
   if (!json_object (j, "error", e)) return;
-  pw_json_text (j, "repeated", e->repeated);
-  pw_json_text (j, "unknown", e->unknown);
-  pw_json_number (j, "t", e->t);
+  pw_json_print (j, "repeated: %s, unknown: %s, t: %g", e->repeated, e->unknown, e->t);
   json_errors (j, "end", s, e, e->end);
   json_errors (j, "largest", s, e, e->largest);
   pw_json_close (j, '}');
@@ -206,14 +237,9 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   if (pw_require (summary, "a summary", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return PW_INPUT;
   pw_json j = { .f = pw_output_stream (o), .lines = 99 /* all levels */ };
   errno = 0;
-  pw_json_open (&j, NULL, '{');
-  pw_json_number (&j, "schema", 1);
-  pw_json_text (&j, "model", summary->model);
-  pw_json_text (&j, "method", summary->method);
-  pw_json_text (&j, "status", summary->status);
-  pw_json_text (&j, "reason", summary->reason);
-  pw_json_text (&j, "engine", summary->general == NULL ? NULL : *summary->general ? "general" : "specialised");
-  pw_json_text (&j, "engine_reason", summary->general);
+  const char *engine = summary->general == NULL ? NULL : *summary->general ? "general" : "specialised";
+  pw_json_print (&j, "{schema: %d, model: %s, method: %s, status: %s, reason: %s, engine: %s, engine_reason: %s", 1,
+                 summary->model, summary->method, summary->status, summary->reason, engine, summary->general);
   json_sample (&j, s, sample, ledger);
   if (summary->of) pw_json_open (&j, "of", '{');
   for (int i = 0; summary->of && summary->of[i]; i++)
@@ -224,11 +250,9 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
                   isnan (summary->stop_time) ? NULL
                                              : PW_PRINTED (400, "%.300s at t = %s s", summary->until,
                                                            pw_format ((char[32]){ 0 }, summary->stop_time, 17)));
-  pw_json_number (&j, "unbalanced", summary->energy_defect);
-  pw_json_open (&j, "redundant", '[');
+  pw_json_print (&j, "unbalanced: %g, redundant: [", summary->energy_defect);
   for (const char *const *text = summary->redundant; text && *text; text++) pw_json_text (&j, NULL, *text);
-  pw_json_close (&j, ']');
-  pw_json_open (&j, "differences", '[');
+  pw_json_print (&j, "], differences: [");
   for (int i = 0, n = s ? pw_system_differences (s) : 0; i < n; i++)
     pw_json_text (&j, NULL, PW_NAME (pw_system_difference_name, s, i));
   pw_json_close (&j, ']');

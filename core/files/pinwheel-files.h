@@ -304,6 +304,9 @@ void pw_json_number (pw_json *j, const char *key, double value);
 void pw_json_numbers (pw_json *j, const char *key, const double *value, int count); /* a list */
 void pw_json_text (pw_json *j, const char *key, const char *text);                  /* NULL: null */
 void pw_json_flag (pw_json *j, const char *key, int value);
+/* Writes items by a template such as "{name: %s, value: %g, list: [": %s a text or null, %g, %d and %ld a number, %i a
+ * flag; a line end begins a line with the next item.  What is opened may be closed by another call. */
+void pw_json_print (pw_json *j, const char *format, ...) PW_PRINTF (2, 3);
 
 /* ---- Summaries ---- */
 
