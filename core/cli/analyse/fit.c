@@ -1000,7 +1000,7 @@ static int fit_open (pw_fit *fit, pw_error *error) {
   if (status == PW_OK) status = pw_unknowns_open (&fit->unknowns, &fit->line, error);
   fit->t_end = fit->unknowns.settings.span;
   if (status == PW_OK) status = fit_read_data (fit, error);
-  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
+  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, "--free", fit->free, error);
   if (status != PW_OK) return status;
   if (fit->residuals < fit->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,

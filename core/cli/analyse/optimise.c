@@ -758,7 +758,7 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
     status = optimise_open_outputs (problem, 0, 1, problem->maximise ? "--maximise" : "--minimise", error);
   if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
   if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, error);
-  if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
+  if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, "--free", problem->free, error);
   if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
   if (status == PW_OK) status = pw_files_open (&problem->line, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;

@@ -56,9 +56,7 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
     pw_unknown_run run = { .run = NULL };
     pw_error own = { 0 };
     x[p] = values[p] + side * step;
-    int opened = pw_unknown_run_prepare (&run, u, x, &own);
-    if (opened == PW_OK && (run.run = pw_limit_open (run.m.system, u->method, &run.settings, &own)) == NULL)
-      opened = own.status;
+    const int opened = pw_unknown_run_open (&run, u, x, &own);
     if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
     const pw_system *other = run.m.system;
     if (opened == PW_OK &&
@@ -109,15 +107,22 @@ static int sensitivity_differentiate (sensitivity *cmd, const double *values, pw
   return pw_unknowns_differentiate (u, values, d, cmd->derivative, error);
 }
 
+/* Sets the typical size of an unknown: |value|, but at least 0.1 rad for angles and the unit of the scene for states;
+ * for a parameter that is 0 its default value, or 1 if that is 0, too. */
+static void sensitivity_measure (pw_unknown *u, double value, const pw_run *r) {
+  double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
+  if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
+  if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
+  if (size == 0 && u->parameter) size = fabs (u->parameter->value);
+  u->size = size > 0 ? size : 1;
+}
+
 /* Chooses the method of the runs that are compared, and measures the sizes of the unknowns. */
 static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   pw_unknown_run run;
-  pw_run *r = NULL;
-  int status = pw_unknown_run_prepare (&run, u, values, error);
-  if (status == PW_OK) r = run.run = pw_limit_open (run.m.system, u->method, &run.settings, error);
-  if (status == PW_OK && r == NULL) status = error->status;
-  for (int p = 0; p < u->count && status == PW_OK; p++) pw_unknown_measure (&u->list[p], values[p], r);
+  int status = pw_unknown_run_open (&run, u, values, error);
+  for (int p = 0; p < u->count && status == PW_OK; p++) sensitivity_measure (&u->list[p], values[p], run.run);
   if (status == PW_OK) {
     cmd->outputs.method =
         pw_accurate_method (run.m.system, &run.settings, u->settings.span, &cmd->outputs.max_steps, error);
@@ -336,6 +341,18 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
+/* Sets the values of unknown initial states to those of the consistent initial state. */
+static int sensitivity_start (pw_unknowns *u, pw_error *error) {
+  pw_unknowns none = *u;
+  pw_unknown_run run;
+  none.count = 0, none.engine.code = NULL;
+  int status = pw_unknown_run_open (&run, &none, NULL, error);
+  for (pw_unknown *x = u->list; x < u->list + u->count && status == PW_OK; x++)
+    if (x->state >= 0) x->value = pw_cli_state_change (run.m.system, pw_run_initial (run.run), x->state).consistent;
+  pw_unknown_run_close (&run);
+  return status;
+}
+
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   double every = 0;
   int status = pw_cli_open (&cmd->line, error);
@@ -366,7 +383,8 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
     t[(int)count] = t_end;
     cmd->outputs.t = t, cmd->outputs.rows = (int)count + 1;
   }
-  return pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error);
+  status = pw_unknowns_read (&cmd->unknowns, "--by", cmd->by, error);
+  return status == PW_OK ? sensitivity_start (&cmd->unknowns, error) : status;
 }
 
 static int sensitivity_command (void *options, pw_error *error) {

@@ -78,57 +78,34 @@ static int unknown_read_bounds (pw_unknown *u, const char *text, pw_error *error
                   u->name, u->value, u->low, u->high, u->parameter ? "--set" : "--start");
 }
 
-/* Adds the unknown of "NAME" or "NAME=LOW:HIGH". */
-static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
-  const size_t size = strcspn (text, "=");
-  pw_unknown *added = u->list + u->count;
+/* Adds the unknown of "NAME" or, of --free, "NAME=LOW:HIGH". */
+static int unknown_add (pw_unknowns *u, const char *option, const char *text, pw_error *error) {
+  const int is_free = strcmp (option, "--free") == 0;
+  const size_t size = is_free ? strcspn (text, "=") : strlen (text);
+  pw_unknown *added = u->list + u->count++;
   char name[sizeof added->name];
   snprintf (name, sizeof name, "%.*s", (int)size, text);
-  for (int i = 0; i < u->count; i++)
-    if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
-  u->count++;
   int status = unknown_find (added, &u->line->m, name, error);
+  for (const pw_unknown *x = u->list; x < added; x++)
+    if (strcmp (x->name, name) == 0) return pw_fail (error, PW_INPUT, "%s %s is given twice", option, name);
   if (added->parameter && added->parameter->domain == PW_COUNT)
-    status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
+    return is_free
+               ? pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name)
+               : pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously",
+                          name, added->value);
   if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text, error);
   added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
   return status;
 }
 
-int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
+int pw_unknowns_read (pw_unknowns *u, const char *option, const char **list, pw_error *error) {
   size_t count = 0;
   int status = PW_OK;
   if (list == NULL) return pw_fail (error, PW_INPUT, "nothing is free: add --free NAME or --free NAME=LOW:HIGH");
   while (list[count]) count++;
   u->list = calloc (count, sizeof *u->list);
   if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (size_t i = 0; i < count && status == PW_OK; i++) status = unknown_add (u, list[i], error);
-  return status;
-}
-
-int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error) {
-  while (list[u->count]) u->count++;
-  u->list = calloc ((size_t)u->count, sizeof *u->list);
-  if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  const int n = pw_system_coordinates (u->line->m.system);
-  pw_limit limit = { .seconds = u->limit };
-  pw_settings settings = u->settings;
-  settings.stop = pw_limit_over, settings.stop_context = &limit;
-  pw_limit_start (&limit);
-  pw_run *r = pw_limit_open (u->line->m.system, u->method, &settings, error);
-  int status = r ? PW_OK : error->status;
-  for (int i = 0; i < u->count && status == PW_OK; i++) {
-    pw_unknown *x = &u->list[i];
-    status = unknown_find (x, &u->line->m, list[i], error);
-    if (status == PW_OK && x->state >= 0)
-      x->value = x->state < n ? pw_run_initial (r)->q[x->state] : pw_run_initial (r)->v[x->state - n];
-    if (status == PW_OK && x->parameter && x->parameter->domain == PW_COUNT)
-      status = pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously",
-                        list[i], x->value);
-    for (int k = 0; k < i && status == PW_OK; k++)
-      if (strcmp (list[k], list[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", list[i]);
-  }
-  pw_run_close (r);
+  for (size_t i = 0; i < count && status == PW_OK; i++) status = unknown_add (u, option, list[i], error);
   return status;
 }
 
@@ -154,6 +131,12 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
   return PW_OK;
 }
 
+int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+  if (pw_unknown_run_prepare (to, u, x, error) != PW_OK) return error->status;
+  to->run = pw_limit_open (to->m.system, u->method, &to->settings, error);
+  return to->run ? PW_OK : error->status;
+}
+
 void pw_unknown_run_close (pw_unknown_run *run) {
   pw_run_close (run->run);
   pw_cli_close_model (&run->m);
@@ -169,14 +152,6 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
     pw_cli_say ("pinwheel: given initial values of this result were changed to satisfy the constraints, at worst %s\n",
                 text);
   pw_unknown_run_close (&r);
-}
-
-void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r) {
-  double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
-  if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
-  if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
-  if (size == 0 && u->parameter) size = fabs (u->parameter->value);
-  u->size = size > 0 ? size : 1;
 }
 
 int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_difference_settings d, pw_derivative *out,

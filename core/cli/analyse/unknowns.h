@@ -12,7 +12,7 @@ typedef struct {
   int state;                     /* its number; -1 for a parameter */
   double value;                  /* in the model of the command line */
   char unit[16];
-  double size;      /* a typical size: set by pw_unknown_measure; else 0 */
+  double size;      /* a typical size: set by sensitivity_measure; else 0 */
   double low, high; /* bounds, of --free or else of the parameter's domain; infinite without one */
   /* for searches: */
   double scale;    /* size of typical changes: high - low of --free, else |value|, else 1 */
@@ -35,13 +35,10 @@ typedef struct {
 /* Reads the options of runs; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
-/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH[:log]" of --free, ended by NULL.  PW_INPUT for a name that the
- * model does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
-int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
-/* Finds the unknowns of a list of names of --by, ended by NULL; values of initial states are those of the consistent
- * initial state.  PW_INPUT for a name that the model does not have, that is given twice or that is a count; else as
- * pw_run_open. */
-int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error);
+/* Reads unknowns from a list, ended by NULL, of "NAME" or, of --free, "NAME=LOW:HIGH[:log]".  PW_INPUT for a name that
+ * the model does not have or that is given twice, a parameter that is a count, and bounds outside its domain or without
+ * its value between them. */
+int pw_unknowns_read (pw_unknowns *u, const char *option, const char **list, pw_error *error);
 /* Chooses the engine for searches from `starts` points, of about `runs` runs each.  PW_INPUT if there are too many
  * unknowns for more than one start. */
 int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error);
@@ -56,11 +53,9 @@ typedef struct {
 /* Compiles the model and sets m and settings, with the engine and a limit of its own, whose clock starts; the caller
  * opens `run`.  *to must not move, since settings points to its limit.  Close it in every case. */
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
+/* The same, and opens the run. */
+int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_run_close (pw_unknown_run *run);
-
-/* Sets the typical size of an unknown: |value|, but at least 0.1 rad for angles and the unit of the scene for states;
- * for a parameter that is 0 its default value, or 1 if that is 0, too. */
-void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r);
 
 /* Differentiates outputs at values x of the unknowns, within their bounds; d: all but x, parameters, size, low, high.
  * out, errors: as pw_differentiate. */
