@@ -9,8 +9,6 @@
 #include <popt.h>
 #include <signal.h>
 #include <stdatomic.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <time.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"

@@ -2,15 +2,12 @@
 #define _GNU_SOURCE /* memmem */
 #include <errno.h>
 #include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "cli.h"
-#include "util.h"
 
 enum { FILES_FOLDER = 4064 }; /* longest name of a folder: the paths of files in it have room in 4096 bytes */
 

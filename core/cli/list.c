@@ -1,6 +1,5 @@
 /* pinwheel list: models, methods, element types and signals. */
 #include <errno.h>
-#include <stdio.h>
 #include <string.h>
 #include "cli.h"
 

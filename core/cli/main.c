@@ -2,8 +2,6 @@
 #include <errno.h>
 #include <gsl/gsl_version.h>
 #include <nlopt.h>
-#include <signal.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"

@@ -3,11 +3,9 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_min.h>
 #include <math.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include "outcome.h"
-#include "util.h"
 #include "cli.h"
 
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error) {

@@ -1,6 +1,5 @@
 /* pinwheel show: bodies, elements, parameters and defaults of a model. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"

@@ -6,7 +6,6 @@
  * "NAME" or "NAME [unit]"; numbers are converted to SI units.  Blank lines and lines that begin with # are skipped. */
 #include <ctype.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"

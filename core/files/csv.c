@@ -5,7 +5,6 @@
  * The functions of a group of columns write their names or their values, as pw_csv.names says. */
 #include <errno.h>
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"

@@ -11,7 +11,6 @@
 #include <math.h>
 #include <string.h>
 #include "expression_parts.h"
-#include "pinwheel.h"
 
 #define SIDE_ROUND_OFF (16 * DBL_EPSILON) /* of a condition's operands */
 

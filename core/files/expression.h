@@ -12,7 +12,6 @@
 #ifndef PW_EXPRESSION_H
 #define PW_EXPRESSION_H
 
-#include <stddef.h>
 #include "util.h"
 
 typedef struct {

@@ -1,7 +1,6 @@
 /* Files: reading; names, conflicts between them, locks; outputs, which are renamed when complete; checkpoints. */
 #include <errno.h>
 #include <fcntl.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>

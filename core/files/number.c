@@ -4,8 +4,6 @@
 #include <errno.h>
 #include <locale.h>
 #include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"

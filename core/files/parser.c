@@ -10,13 +10,10 @@
 #include <float.h>
 #include <math.h>
 #include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "expression_parts.h"
 #include "files.h"
-#include "pinwheel.h"
-#include "pinwheel-files.h"
 
 #define DIGITS "0123456789"
 

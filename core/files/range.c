@@ -3,7 +3,6 @@
 #include <float.h>
 #include <math.h>
 #include "expression_parts.h"
-#include "pinwheel.h"
 
 static const pw_range range_nan = { .lo = INFINITY, .hi = -INFINITY, .nan = 1 };
 static const pw_range range_all = { .lo = -INFINITY, .hi = INFINITY, .nan = 1 };

@@ -10,7 +10,6 @@
 #define PW_YAML_READ_H
 
 #include <string.h>
-#include "expression.h"
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as

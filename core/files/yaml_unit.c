@@ -1,8 +1,6 @@
 /* Units of parameters, which must be SI units: 40 with the unit deg would mean 40 rad. */
 #include <ctype.h>
-#include <stdio.h>
 #include <string.h>
-#include "expression.h"
 #include "yaml.h"
 
 enum { UNIT_BYTES = 400 /* of a unit of up to 60 characters with SI units in place of others, and its end */ };

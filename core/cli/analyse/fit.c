@@ -10,7 +10,6 @@
 #include <string.h>
 #include "unknowns.h"
 #include "figure.h"
-#include "cli.h"
 
 /* A least-squares fit for `pinwheel fit`: its options, data and results.  Comments on arrays begin with their sizes;
  * arrays "columns x rows" have the rows of the first column, then those of the second one, ... */

@@ -1,10 +1,7 @@
 /* The command `linearise`: x' = A x + B u, y = C x + D u, linearised at a time of a run or at a steady motion. */
 #include <complex.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
-#include "pinwheel-analysis.h"
 #include "plot.h"
 #include "report.h"
 #include "states.h"

@@ -10,7 +10,6 @@
 #include <string.h>
 #include "unknowns.h"
 #include "figure.h"
-#include "cli.h"
 
 /* An optimisation for `pinwheel optimise`: the problem, its searches and their results.  Comments on arrays begin with
  * their sizes. */

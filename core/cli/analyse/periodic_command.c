@@ -1,11 +1,9 @@
 /* The command `periodic`: relative periodic motions, and their branches over a parameter. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "unknowns.h"
 #include "figure.h"
 #include "report.h"
-#include "cli.h"
 #include "states.h"
 
 /* A periodic motion found, or a point of a branch. */

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
-#include "cli.h"
 #include "report.h"
 #include "unknowns.h"
 

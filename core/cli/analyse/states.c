@@ -1,6 +1,5 @@
 /* States in options and reports of `linearise`, `steady` and `periodic`. */
 #include "states.h"
-#include "cli.h"
 
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error) {

@@ -1,12 +1,10 @@
 /* The command `steady`: steady motions, and their branches over a parameter. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "states.h"
 #include "unknowns.h"
 #include "figure.h"
 #include "report.h"
-#include "cli.h"
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {

@@ -1,6 +1,5 @@
 /* The command `page`: an interactive page, which simulates a model in the browser.  It consists of animate.html with
  * the panel page.html, the script page.js, the model, and the engine: integrators compiled to WebAssembly. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

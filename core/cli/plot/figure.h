@@ -2,7 +2,6 @@
 #ifndef PW_FIGURE_H
 #define PW_FIGURE_H
 
-#include <stdio.h>
 #include "cli.h"
 
 enum {

@@ -1,5 +1,4 @@
 /* Samples for figures: equally spaced in time, for a limited number of bodies and wheels. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "plot.h"

@@ -1,6 +1,5 @@
 /* Shapes of bodies in figures and animations, and the elements drawn between them (links), with their forces. */
 #include <ctype.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "plot.h"

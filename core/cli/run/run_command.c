@@ -3,10 +3,7 @@
  * Steps are taken in batches that end where a sample is due, so that between samples only the method runs, and only its
  * time is measured. */
 #include <float.h>
-#include <math.h>
 #include <pthread.h>
-#include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>

@@ -6,7 +6,6 @@
 
 #include <pthread.h>
 #include "figure.h"
-#include "cli.h"
 
 enum {
   STUDY_NAME = 200,     /* longest name of a method with its options, end included */
