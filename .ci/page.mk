@@ -17,7 +17,7 @@ WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sec
   -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8) PW_METHOD (radau) PW_METHOD (galpha) PW_METHOD (leapfrog) PW_METHOD (moreau)' \
   $(ALL) -iquote $(BUILD)/obj/core/cli/plot $(SYSTEM)
 WASM       := $(filter-out solvers/matrices/sparse.c solvers/run/ensemble.c solvers/analysis/% solvers/sundials/%,$(CORE) $(SOLVERS)) \
-  $(addprefix core/files/,parser.c evaluation.c range.c yaml.c yaml_read.c yaml_signal.c yaml_expand.c yaml_unit.c yaml_text.c number.c json.c columns.c svg.c) $(addprefix core/cli/,plot/plot_samples.c plot/plot_shapes.c plot/animate.c) \
+  $(addprefix core/files/,parser.c evaluation.c range.c yaml.c yaml_read.c yaml_signal.c yaml_include.c yaml_text.c number.c json.c columns.c svg.c) $(addprefix core/cli/,plot/plot_samples.c plot/plot_shapes.c plot/animate.c) \
   core/cli/page/engine/page_engine.c
 WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
 

@@ -76,12 +76,10 @@ typedef struct {
 size_t pw_expression_size (const pw_expression *expression);
 void pw_expression_share_paths (const pw_expression *expression);
 void pw_expression_release_paths (const pw_expression *expression);
-
 /* Reads an expression of a scope and at most 32 variables, which end with NULL, into an arena; scope and `variable` may
  * be NULL.  PW_INPUT, error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **expression, pw_expression_error *error);
-
 /* The same of an expression without variables: its value, which may be non-finite.  The scope may be NULL. */
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error);
 
@@ -89,24 +87,20 @@ int pw_expression_constant (const pw_scope *s, const char *text, double *value, 
 
 /* The value, which may be non-finite; at a jump in time, that just after it. */
 double pw_expression_value (const pw_expression *expression, const double *variable);
-
 /* The value and its first two derivatives with respect to variable `by`; just after it at a jump or kink, as this
  * variable grows.  NaN or infinite are derivatives that those of operands do not determine: of sqrt and atan2 at 0. */
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]);
-
 /* The first time after t at which the value, or a time derivative, may jump whatever the other variables are; INFINITY
  * if there is none.  If the search would take too long, or jumps are too frequent for steps to end at each
  * (range.c): a time after t up to which there are no others.  Not found are jumps whose times depend on other
  * variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
-
 /* The number of conditions on states (evaluation.c); `side`: the side of each one, of which there are at most `codes`.
  * beyond NULL: stores the sides at these variables and, unless `fixed` is NULL, makes `fixed`, with room for codes + 2
  * conditions operations, the expression with these sides: paths remain those of x.  Otherwise stores how far each
  * condition is beyond its side, where it matters. */
 int pw_expression_sides (const pw_expression *x, const double *variable, double *side, double *beyond,
                          pw_expression *fixed);
-
 /* Bounds of the value for all values of the variables between lo and hi, infinite if they are unknown. */
 void pw_expression_bounds (const pw_expression *expression, int variables, const double *lo, const double *hi,
                            double bounds[2]);
@@ -126,7 +120,6 @@ enum { PW_EXPRESSION_NAME = 100 };
 const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
 /* The same, also of PATH.FUNCTION. */
 const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_NAME]);
-
 /* Whether a text is a single number; its value may overflow to infinity. */
 int pw_expression_number (const char *text, double *value);
 

@@ -109,10 +109,8 @@ int pw_expression_find_function (const char *name);
 
 /* The value of operations; *may_jump becomes 1 if one of them may jump there, as at equal numbers or poles. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump);
-
 /* The value of an operation of `right` alone or of `left` and `right`, other than functions of the nearest point. */
 double pw_expression_apply (const pw_expression_code *c, double left, double right);
-
 /* As pw_expression_derivatives.  discrete, unless NULL, receives for each operation a number that differs on the two
  * sides of each of its breakpoints: the value of floor, the sign of the operand of abs. */
 void pw_expression_run_jet (const pw_expression *expression, const double *variable, int by, double u[3],
@@ -130,7 +128,6 @@ typedef struct {
 
 /* The range over a time interval, without breaks of operations that are marked in `noisy`, one mark per operation. */
 pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi);
-
 /* Whether the last of these operations, a part of an expression, may jump at some time in some state: atan2 (x, 1) and
  * sign (x^2 + 1) do not. */
 pw_jumps pw_expression_may_jump (const pw_expression_code *code, int codes);

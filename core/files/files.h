@@ -17,13 +17,11 @@ enum { PW_PATH = PATH_MAX + 1 };
 /* Whether nan in a column other than the time is an error, or a gap like an empty cell; or empty cells are errors, too,
  * as in a path, of which the first column is not the time. */
 typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED, PW_GAPLESS } pw_gaps;
-
 /* As pw_read_columns, from a stream, which stays open; `shown` is its path in messages, "SHOWN:LINE: REASON".  NULL in
  * place of a column: the first one, or the second one, which is not the time; without gaps: x and y by name, if there
  * are both. */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, unsigned char *missing, int *rows, pw_error *error);
-
 /* The length of the number at p: digits, perhaps with a point and an exponent; 0 if there is none (parser.c). */
 size_t pw_number_size (const char *p);
 
@@ -56,7 +54,6 @@ const char *pw_unit_power (const char *p, int *power);
 /* As pw_read_rest, of the regular file at a path.  If it cannot be opened, the error is "FAILURE PATH: REASON". */
 int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,
                   pw_error *error);
-
 /* Reads the rest of a file of at most `max_bytes` bytes into *text, zero-terminated; free it in every case.  `limit`
  * names the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or unreadable; PW_RESOURCE. */
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
@@ -66,7 +63,6 @@ int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit
 
 /* Why a file is refused: "it is a directory, not a regular file". */
 const char *pw_not_regular (mode_t mode);
-
 /* Stores the folder of the file at a path in the buffer, which is returned. */
 char *pw_folder_of (char folder[PW_PATH], const char *path);
 
@@ -86,7 +82,6 @@ int pw_lock_file (const char *path, pw_lock_mode mode);
 
 /* PW_RESOURCE if a write to its stream has failed; set errno to 0 before writing, for the reason. */
 int pw_output_check (pw_output *o, pw_error *error);
-
 /* Whether the output was opened by pw_output_continue. */
 int pw_output_continued (const pw_output *o);
 /* 1 if its path has this ending. */

@@ -61,6 +61,81 @@ static int read_reference (pw_reader *r) {
   return pw_yaml_entries (r, r->y->reference, reference_entry);
 }
 
+/* A frame in the plane. */
+typedef struct pw_place {
+  double at[2], phi; /* [m], [rad] */
+  double cos, sin;
+} pw_place;
+
+/* Turns a vector from the frame to the world (sign 1), or back (-1). */
+static void place_turn (const pw_place *p, int sign, double v[2]) {
+  const double x = v[0], y = v[1], s = sign * p->sin;
+  if (p->phi == 0) return; /* so that no bit changes */
+  v[0] = p->cos * x - s * y;
+  v[1] = s * x + p->cos * y;
+}
+
+/* The point in the world of a point in the frame. */
+static void place_point (const pw_place *p, double v[2]) {
+  place_turn (p, 1, v);
+  v[0] += p->at[0], v[1] += p->at[1];
+}
+
+static void place_back (const pw_place *p, double v[2]) {
+  v[0] -= p->at[0], v[1] -= p->at[1];
+  place_turn (p, -1, v);
+}
+
+/* The frame at (x, y) and phi in that around it; NULL: in the world. */
+static pw_place place_in (const pw_place *around, const double at[2], double phi) {
+  pw_place p = { .at = { at[0], at[1] }, .phi = phi, .cos = 1 };
+  if (around) {
+    place_point (around, p.at);
+    p.phi += around->phi;
+  }
+  if (p.phi != 0) p.cos = cos (p.phi), p.sin = sin (p.phi);
+  return p;
+}
+
+/* Moves the initial state of a body from a frame, or NULL, to the world.  Returns "", or the pair of which only one
+ * value is specified, so that it cannot be turned. */
+static const char *place_body (const pw_place *p, pw_body *body) {
+  for (int i = 0; p && p->phi != 0 && i < 6; i += 3)
+    if ((body->specified >> i & 1) != (body->specified >> (i + 1) & 1)) return i ? "vx and vy" : "x and y";
+  if (p) place_point (p, body->start), place_turn (p, 1, body->rate);
+  body->start[2] += p ? p->phi : 0;
+  return "";
+}
+
+/* Makes a body a uniform bar between two points. */
+static void place_bar (pw_body *body, const double from[2], const double to[2]) {
+  const double dx = to[0] - from[0], dy = to[1] - from[1];
+  body->inertia = body->mass * (dx * dx + dy * dy) / 12;
+  body->start[0] = (from[0] + to[0]) / 2, body->start[1] = (from[1] + to[1]) / 2, body->start[2] = atan2 (dy, dx);
+  body->specified |= 7;
+}
+
+/* The name of body i of an element, or NULL. */
+static const char *place_body_of (const pw_kind *kind, const char *definition, int i) {
+  const char *name = NULL;
+  for (const pw_field *f = kind->fields; f->name; f++)
+    if (f->type == PW_BODY && i < pw_field_count (f))
+      memcpy (&name, definition + f->offset + (size_t)i * pw_field_bytes (PW_BODY), sizeof name);
+  return name;
+}
+
+/* A field that may be a direction in the ground, which a frame, or NULL, turns; or NULL. */
+static const char *place_direction (const pw_place *p, const pw_kind *kind, const char *definition) {
+  const char *body = place_body_of (kind, definition, 0), *second = place_body_of (kind, definition, 1);
+  if (p == NULL || p->phi == 0 || kind == &pw_kind_state) return NULL;
+  if (body && strcmp (body, "ground") != 0 && (second == NULL || strcmp (second, "ground") != 0)) return NULL;
+  for (const pw_field *f = kind->fields; f->name; f++)
+    if (f->type == PW_SIGNAL || f->type == PW_CHOICE || f->type == PW_VECTOR ||
+        (f->type == PW_NUMBER && f->domain == PW_REAL))
+      return f->name;
+  return NULL;
+}
+
 /* ---- Bodies ----
  *
  * Bodies and elements are passed to pw_add_body and pw_add, like those of a build function in C.  The core checks them;
@@ -75,7 +150,7 @@ static int build_bar (pw_reader *r, const pw_node *name, const pw_node *from, co
       pw_yaml_pair (r, to, label, "numbers, [x, y]", b) != PW_OK)
     return r->error->status;
   if (a[0] == b[0] && a[1] == b[1]) return read_fail (r, to->at, "%s: its two points are the same", label);
-  pw_place_bar (body, a, b);
+  place_bar (body, a, b);
   return PW_OK;
 }
 
@@ -111,7 +186,7 @@ static int build_body (pw_reader *r, const pw_node *node) {
     }
   }
   if (r->error->status != PW_OK || pw_yaml_outline (r, v[5], &body) != PW_OK) return r->error->status;
-  const char *alone = pw_place_body (r->place, &body);
+  const char *alone = place_body (r->place, &body);
   if (*alone)
     return read_fail (r, name->at, "body %.60s: in a file placed at an angle, %s are given both or neither", body.name,
                       alone);
@@ -136,19 +211,19 @@ static int build_body_name (const pw_reader *r, const pw_node *node, const char 
 static int build_point (pw_reader *r, const pw_node *node, int i, double to[2]) {
   static const char *const key[] = { "world", NULL };
   const pw_node *world = NULL;
-  const char *name = pw_place_body_of (r->kind, r->definition, i);
+  const char *name = place_body_of (r->kind, r->definition, i);
   if (node->type == PW_YAML_MAP && pw_yaml_keys (r, node, key, "a point", &world) != PW_OK) return r->error->status;
   if (pw_yaml_pair (r, world ? world : node, r->label, "numbers, [x, y]", to) != PW_OK || name == NULL)
     return r->error->status;
-  if (r->place && (world || strcmp (name, "ground") == 0)) pw_place_point (r->place, to);
+  if (r->place && (world || strcmp (name, "ground") == 0)) place_point (r->place, to);
   if (world == NULL || strcmp (name, "ground") == 0) return PW_OK;
   int bodies;
   const pw_body *body = pw_model_bodies (r->model, &bodies) + pw_names_find (&r->bodies, name);
   if ((body->specified & 7) != 7)
     return read_fail (r, node->at, "%s: a point of the world needs x, y and phi in the start of body %s", r->label,
                       name);
-  const pw_place place = pw_place_in (NULL, body->start, body->start[2]);
-  pw_place_back (&place, to);
+  const pw_place place = place_in (NULL, body->start, body->start[2]);
+  place_back (&place, to);
   return PW_OK;
 }
 
@@ -210,6 +285,31 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   return r->error->status;
 }
 
+/* Whether a word of a text begins with this prefix of at least 3 bytes. */
+static int kind_has_word (const char *text, const char *prefix) {
+  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
+    if (at == text || strchr (" (", at[-1])) return 1;
+  return 0;
+}
+
+/* 1 if an element type has a field of this name. */
+static int kind_has_field (const char *name) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    for (const pw_field *f = (*k)->fields; f->name; f++)
+      if (strcmp (f->name, name) == 0) return 1;
+  return 0;
+}
+
+/* The element type whose name is near, or in whose description a word begins with the text. */
+static pw_nearest kind_nearest (const char *text) {
+  pw_nearest near = { .sought = text };
+  for (const pw_kind *const *k = pw_kinds; *k; k++) pw_nearest_try (&near, (*k)->name);
+  /* "hinge" pin, "damper" spring; names of fields, as "angle", do not suggest a type */
+  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !kind_has_field (text); k++)
+    if (kind_has_word ((*k)->about, text)) snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
+  return near;
+}
+
 static int build_kind (pw_reader *r, const pw_node *node) {
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
   if (first == NULL || first->type != PW_YAML_SCALAR)
@@ -224,7 +324,7 @@ static int build_kind (pw_reader *r, const pw_node *node) {
     if (kind >= 0)
       return read_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", pw_kinds[kind]->name);
   }
-  pw_nearest near = pw_yaml_nearest_kind (first->text);
+  pw_nearest near = kind_nearest (first->text);
   return read_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                     near.near ? pw_nearest_text (&near) : ": see pinwheel list kinds");
 }
@@ -250,7 +350,7 @@ static int build_fields (pw_reader *r, const pw_node *at, const pw_node *node, c
       read_fail (r, at->at, "%s %.60s needs \"%s\": %s", kind->name, name, f->name, f->about ? f->about : "");
   }
   if (r->error->status != PW_OK) return r->error->status;
-  const char *direction = pw_place_direction (r->place, kind, r->definition);
+  const char *direction = place_direction (r->place, kind, r->definition);
   if (direction)
     return read_fail (r, node->at,
                       "%s %.60s: its \"%s\" refers to the ground, which does not turn with a file placed at an angle",
@@ -517,7 +617,7 @@ static int build_include (pw_reader *r, const pw_node *node) {
     return r->error->status;
   if (*prefix && !pw_expression_is_name (prefix))
     return read_fail (r, v[1]->at, "prefix \"%.60s\": expected a letter, then letters, digits and _", prefix);
-  const pw_place place = pw_place_in (r->place, at, phi);
+  const pw_place place = place_in (r->place, at, phi);
   pw_yaml file = *r->y; /* the same source, with other lists */
   file.arena = (pw_arena){ 0 };
   file.root = v[0], file.parameter_count = 0;

@@ -3,12 +3,207 @@
 #include <stdlib.h>
 #include "yaml_read.h"
 
+/* Copies of an entry with the key `repeat`, for one value of a counter after another. */
+typedef struct pw_copies {
+  const pw_scope *scope; /* given: names besides the counter in numbers */
+  pw_arena *arena;       /* given */
+  const pw_node *repeat; /* given: the key */
+  const char *counter;   /* given: its name */
+  int i;                 /* its value */
+  pw_node *entry;        /* the copy, without the key */
+  struct pw_copy_text *text;
+  int scalars;                  /* texts without braces, numbered from 1 */
+  const pw_expression **number; /* scalars + 1: those read as numbers so far */
+  double bytes;                 /* of the texts of all copies so far */
+  const pw_node *faulty;        /* after PW_INPUT: the text, and the error in it */
+  pw_expression_error fault;
+} pw_copies;
+
+/* Copies differ only in texts with braces, such as "link{i - 1}".  The entry is therefore copied once, with a list of
+ * these texts.  For each value of the counter only they are replaced. */
+
+enum { COPY_TEXT = 4000 /* bytes of a text with braces, at most */ };
+#define COPY_NUMBER 1e9 /* largest number in braces */
+
+/* Part of a text: some bytes, then a number in braces unless it is the last part. */
+typedef struct copy_part {
+  struct copy_part *next;
+  const char *bytes;
+  size_t size;
+  const pw_expression *number; /* or NULL */
+} copy_part;
+
+struct pw_copy_text {
+  struct pw_copy_text *next;
+  const pw_node *source; /* in the entry */
+  pw_node *node;         /* in the copy */
+  copy_part *first;
+};
+
+/* Records an error at an offset of a text. */
+#define copy_fail(c, node, offset, ...)                                                                         \
+  ((c)->faulty = node, (c)->fault.at = offset, pw_print ((c)->fault.text, sizeof (c)->fault.text, __VA_ARGS__), \
+   PW_INPUT)
+
+/* Reads an expression of the counter, which is not its first variable: that is the time. */
+static int copy_expression (pw_copies *c, const char *text, const pw_expression **x, pw_expression_error *error) {
+  return pw_expression_read (c->scope, (const char *const[]){ "", c->counter, NULL }, text, c->arena, x, error);
+}
+
+static double copy_value (const pw_copies *c, const pw_expression *x) {
+  return pw_expression_value (x, (const double[2]){ 0, c->i });
+}
+
+/* Divides the text at *rest into bytes and a number; *rest is NULL after the last part. */
+static int copy_part_read (pw_copies *c, const pw_node *source, const char **rest, copy_part *part) {
+  const char *open = strchr (*rest, '{');
+  part->bytes = *rest;
+  part->size = open ? (size_t)(open - *rest) : strlen (*rest);
+  *rest = NULL;
+  if (open == NULL) return PW_OK;
+  const size_t at = (size_t)(open - source->text) + 1, size = strcspn (open + 1, "}");
+  if (open[1 + size] == 0) return copy_fail (c, source, at - 1, "there is no \"}\" for this \"{\"");
+  *rest = open + size + 2;
+  int status = copy_expression (c, PW_PRINTED (COPY_TEXT + 1, "%.*s", (int)size, open + 1), &part->number, &c->fault);
+  c->faulty = source;
+  c->fault.at += at;
+  return status;
+}
+
+static int copy_text (pw_copies *c, const pw_node *source, pw_node *node) {
+  struct pw_copy_text *t = pw_arena_alloc (c->arena, sizeof *t);
+  copy_part **to = t ? &t->first : NULL;
+  int status = PW_OK;
+  if (t == NULL) return PW_RESOURCE;
+  if (strlen (source->text) > COPY_TEXT)
+    return copy_fail (c, source, 0, "a text with braces has at most %d bytes", COPY_TEXT);
+  *t = (struct pw_copy_text){ c->text, source, node, NULL };
+  c->text = t;
+  for (const char *rest = source->text; rest && status == PW_OK; to = &(*to)->next) {
+    if ((*to = pw_arena_alloc (c->arena, sizeof **to)) == NULL) return PW_RESOURCE;
+    status = copy_part_read (c, source, &rest, *to);
+  }
+  return status;
+}
+
+/* The key `repeat` of an entry, or NULL. */
+static const pw_node *copies_repeat (const pw_node *entry) {
+  for (const pw_node *n = entry->type == PW_YAML_MAP ? entry->first : NULL; n; n = n->next->next)
+    if (n->type == PW_YAML_SCALAR && strcmp (n->text, "repeat") == 0) return n;
+  return NULL;
+}
+
+/* Copies `from` and the nodes after it, except the key `repeat` and its value, to the list *to. */
+static int copy_nodes (pw_copies *c, const pw_node *from, pw_node **to) {
+  int status = PW_OK;
+  for (const pw_node *n = from; n && status == PW_OK; n = n->next) {
+    if (n == c->repeat) {
+      n = n->next;
+      continue;
+    }
+    if (copies_repeat (n)) return copy_fail (c, copies_repeat (n), 0, "repeat: inside another repeat");
+    if ((*to = pw_arena_alloc (c->arena, sizeof **to)) == NULL) return PW_RESOURCE;
+    **to = *n;
+    (*to)->next = NULL;
+    if (n->type != PW_YAML_SCALAR && !n->is_file) /* the entries of a file are no copies */
+      (*to)->first = NULL, status = copy_nodes (c, n->first, &(*to)->first);
+    else if (n->type == PW_YAML_SCALAR && strchr (n->text, '{'))
+      status = copy_text (c, n, *to);
+    else if (n->type == PW_YAML_SCALAR)
+      (*to)->count = ++c->scalars;
+    to = &(*to)->next;
+  }
+  return status;
+}
+
+static int copies_open (pw_copies *c, const pw_node *entry) {
+  if ((c->entry = pw_arena_alloc (c->arena, sizeof *c->entry)) == NULL) return PW_RESOURCE;
+  *c->entry = *entry;
+  c->entry->next = c->entry->first = NULL;
+  c->entry->count--;
+  int status = copy_nodes (c, entry->first, &c->entry->first);
+  c->number = pw_arena_alloc (c->arena, ((size_t)c->scalars + 1) * sizeof *c->number);
+  return status == PW_OK && c->number == NULL ? PW_RESOURCE : status;
+}
+
+/* Makes c->entry the copy for this value.  Its texts stay in the arena. */
+static int copies_set (pw_copies *c, int i) {
+  char text[4 * COPY_TEXT]; /* at most 11 bytes of a number replace at least 3, "{i}" */
+  c->i = i;
+  for (const struct pw_copy_text *t = c->text; t; t = t->next) {
+    char *end = text;
+    for (const copy_part *p = t->first; p; p = p->next) {
+      memcpy (end, p->bytes, p->size);
+      end += p->size;
+      if (p->number == NULL) continue;
+      double value = copy_value (c, p->number) + 0;                        /* not -0 */
+      if (!(value >= 0 && value <= COPY_NUMBER && value == floor (value))) /* -1 would be a difference: "z-1" */
+        return copy_fail (c, t->source, (size_t)(p->bytes - t->source->text) + p->size,
+                          "the value in braces is %g for %s = %d: expected a whole number >= 0", value, c->counter, i);
+      end += snprintf (end, 20, "%ld", (long)value);
+    }
+    *end = 0;
+    c->bytes += (double)(end - text);
+    if ((t->node->text = pw_arena_copy (c->arena, text)) == NULL) return PW_RESOURCE;
+  }
+  return PW_OK;
+}
+
+/* Stores the value of a text of the copy that is a number.  PW_INPUT, error; PW_RESOURCE. */
+static int copies_number (pw_copies *c, const pw_node *node, double *value, pw_expression_error *error) {
+  const pw_expression *own = NULL, **x = node->count ? &c->number[node->count] : &own;
+  c->bytes += node->count ? 0 : (double)strlen (node->text);
+  int status = *x ? PW_OK : copy_expression (c, node->text, x, error);
+  if (status == PW_OK) *value = copy_value (c, *x);
+  return status;
+}
+
+/* What replaces a name, or NULL. */
+static const char *rename_of (const pw_reader *r, const pw_copies *c, const char *prefix, const char *name,
+                              char to[200]) {
+  if (c && strcmp (name, c->counter) == 0) return pw_print (to, 200, "(%d)", c->i);
+  if (*prefix == 0) return NULL;
+  pw_print (to, 200, "%s%s", prefix, name);
+  if (strchr (name, '.') || pw_names_find (&r->states, to) >= 0 || pw_names_find (&r->outputs, to) >= 0) return to;
+  int i = pw_names_find (&r->scope->index, name);
+  return i < 0 || r->scope->path[i] ? NULL : pw_print (to, 200, "(%.17g)", r->scope->value[i]);
+}
+
+const char *pw_yaml_renamed (const pw_reader *r, const pw_copies *c, const char *prefix, const char *text) {
+  char name[PW_EXPRESSION_NAME], to[200];
+  size_t size = strlen (text) + 1;
+  int changes = 0;
+  for (const char *rest = text; pw_expression_next_word (&rest, name) != NULL;)
+    if (rename_of (r, c, prefix, name, to)) size += strlen (to), changes++;
+  if (changes == 0) return text;
+  char *copy = pw_arena_alloc (r->arena, size), *end = copy;
+  const char *from = text;
+  for (const char *rest = text, *p; copy && (p = pw_expression_next_word (&rest, name)) != NULL;) {
+    if (rename_of (r, c, prefix, name, to) == NULL) continue;
+    end += sprintf (end, "%.*s%s", (int)(p - from), from, to);
+    from = rest;
+  }
+  return copy ? strcpy (end, from), copy : NULL;
+}
+
 const char *pw_node_found (const pw_node *node) {
   return node->type == PW_YAML_LIST ? "a list" : node->type == PW_YAML_MAP ? "a map" : "text";
 }
 
 int pw_node_is (const pw_node *node, const char *text) {
   return node->type == PW_YAML_SCALAR && strcmp (node->text, text) == 0;
+}
+
+/* A hint for a key, which is none of these, that end with NULL, nor like one; or "". */
+static const char *key_hint (const char *text, const char *const *key) {
+  for (int i = 0; key[i]; i++) {
+    size_t n = strlen (key[i]);
+    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
+    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
+  }
+  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
+  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
+  return "";
 }
 
 static int read_key (const pw_reader *r, const pw_node *node, const char *const *key, const char *owner,
@@ -24,7 +219,7 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
   }
   pw_nearest near = { .sought = node->text };
   for (int i = 0; key[i]; i++) pw_nearest_try (&near, key[i]);
-  const char *hint = pw_yaml_key_hint (node->text, key);
+  const char *hint = key_hint (node->text, key);
   return read_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
 }
 
@@ -144,7 +339,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return read_fail (r, node->at, "%s: expected a number, found %s", label, pw_node_found (node));
-  int status = r->copies ? pw_copies_number (r->copies, node, value, &error)
+  int status = r->copies ? copies_number (r->copies, node, value, &error)
                          : pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status == PW_INPUT) suggest_state (r, node->text, &error);
@@ -232,9 +427,9 @@ static int read_copies (pw_reader *r, const pw_node *entry, const pw_node *repea
   int count = 0, status;
   r->copies = NULL; /* also where an entry of another list is being read */
   if (read_repeat (r, repeat, &c.counter, &count) != PW_OK) return r->error->status;
-  status = count ? pw_copies_open (&c, entry) : PW_OK;
+  status = count ? copies_open (&c, entry) : PW_OK;
   for (int i = 1; i <= count && status == PW_OK && r->error->status == PW_OK; i++) {
-    if ((status = pw_copies_set (&c, i)) != PW_OK) break;
+    if ((status = copies_set (&c, i)) != PW_OK) break;
     r->copies = &c;
     if (r->copied + c.bytes > MAX_COPIED)
       read_fail (r, entry->at, "the copies up to here have texts of more than %g MB, the limit for a model",
@@ -253,7 +448,7 @@ static int read_copies (pw_reader *r, const pw_node *entry, const pw_node *repea
 int pw_yaml_entries (pw_reader *r, const pw_node *list, read_entry *each) {
   const pw_node *first = list && list->type == PW_YAML_LIST ? list->first : list;
   for (const pw_node *n = first; n && r->error->status == PW_OK; n = n == list ? NULL : n->next) {
-    const pw_node *repeat = pw_yaml_repeat (n);
+    const pw_node *repeat = copies_repeat (n);
     if (repeat)
       read_copies (r, n, repeat, each);
     else
@@ -265,11 +460,10 @@ int pw_yaml_entries (pw_reader *r, const pw_node *list, read_entry *each) {
 /* ---- Expressions of time and, in forces, of states: BODY.phi, ELEMENT.spin ---- */
 
 int pw_yaml_rename (pw_reader *r, const pw_node *node, pw_node *renamed) {
-  const pw_renames names = { r->copies, r->prefix, &r->states, &r->outputs, r->scope };
   const char *text = "";
   if (pw_yaml_text (r, node, r->label, &text) != PW_OK) return r->error->status;
   *renamed = *node;
-  renamed->text = pw_yaml_renamed (&names, text, r->arena);
+  renamed->text = pw_yaml_renamed (r, r->copies, r->prefix, text);
   return renamed->text ? PW_OK : read_no_memory (r);
 }
 

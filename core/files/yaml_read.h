@@ -51,10 +51,10 @@ enum { PW_OUTPUT_UNREAD = -1, PW_OUTPUT_READ = -2 };
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
-  pw_scope *scope;       /* parameters and what `let` defines so far, or NULL */
-  pw_copies *copies;     /* of the entry being read, or NULL */
-  const char *prefix;    /* of names in an included file, or "" */
-  const pw_place *place; /* of the included file, or NULL */
+  pw_scope *scope;              /* parameters and what `let` defines so far, or NULL */
+  struct pw_copies *copies;     /* of the entry being read, or NULL */
+  const char *prefix;           /* of names in an included file, or "" */
+  const struct pw_place *place; /* of the included file, or NULL */
   /* for building */
   pw_model *model;
   pw_arena *arena;              /* lives as long as the model */
@@ -105,7 +105,6 @@ int pw_node_is (const pw_node *node, const char *text);
  * Other keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
 int pw_yaml_keys_from (const pw_reader *r, const pw_node *first, const char *const *key, const char *owner,
                        const pw_node **value);
-
 /* The same in a map. */
 int pw_yaml_keys (const pw_reader *r, const pw_node *map, const char *const *key, const char *owner,
                   const pw_node **value);
@@ -113,72 +112,53 @@ int pw_yaml_keys (const pw_reader *r, const pw_node *map, const char *const *key
 int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *label);
 /* Refuses anything but a list of `count` entries, which are `items` ("bodies"). */
 int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label, int count, const char *items);
-
 /* A name of the file as it is in the model, or NULL if out of memory. */
 const char *pw_yaml_prefixed (const pw_reader *r, const char *name);
-
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, const char **text);
-
 /* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
 size_t pw_source_offset (const pw_yaml *y, const pw_node *node, size_t offset);
-
 /* The name of a signal's argument: "t", the time, or "s", the parameter of a curve. */
 const char *pw_signal_argument (const pw_reader *r);
-
 /* Whether a name in the model is that of a state: BODY.phi, or a first-order state. */
 int pw_is_state_name (const pw_reader *r, const char *name);
-
 /* Reads a name that expressions can use. */
 int pw_yaml_name (const pw_reader *r, const pw_node *node, const char *label, const char **name);
-
 /* 1 if the value of an expression changes during the motion. */
 int pw_yaml_varies (const pw_reader *r, const char *text);
-
 /* A number of a domain: an expression of the names in r->scope. */
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, pw_domain domain, double *value);
-
 /* Two numbers: a list of `items`, "numbers, [x, y]". */
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *label, const char *items, double *value);
-
 /* One of `choices`, which end with NULL, as its index. */
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *label, const char *const *choices, int *value);
-
 /* The index of the element type that a scalar names, or -1. */
 int pw_find_kind_key (const pw_node *node);
-
 /* Adds the names of all bodies so far to the valid names of a suggestion. */
 void pw_suggest_bodies (const pw_reader *r, pw_nearest *near);
-
 /* Counts an entry, for which the tables of names get room. */
 int pw_count_entry (pw_reader *r, const pw_node *node);
-
 /* Calls `each` with the entries of a list, or a map in its place, until an error. */
 int pw_yaml_entries (pw_reader *r, const pw_node *list, read_entry *each);
-
 /* The node of an expression with the names as they are in the model. */
 int pw_yaml_rename (pw_reader *r, const pw_node *node, pw_node *renamed);
-
+/* A text with the counter of copies, or NULL, as a number, the prefix of an included file before the names of its states
+ * and outputs, and its other names as numbers.  NULL if out of memory. */
+const char *pw_yaml_renamed (const pw_reader *r, const struct pw_copies *copies, const char *prefix, const char *text);
 /* Reads an expression; `variable`: names, which end with NULL. */
 int pw_yaml_expression (pw_reader *r, const pw_node *node, const char *const *variable, const char **text,
                         const pw_expression **expression);
-
 /* Indexes all elements of the file, including those not built yet, besides those of files built before. */
 int pw_index_elements (pw_reader *r);
-
 /* The names of a body's states, x to omega, and the number of one, or -1. */
 extern const char *const pw_body_states[6];
 int pw_body_state (const char *part);
-
 /* Checks that a name with a dot, or that of a first-order state, at an offset of the expression, names a state. */
 int pw_check_state_name (pw_reader *r, const pw_node *node, const char *name, size_t at);
-
 /* Whether the name of a state is that of a velocity, not of a coordinate or a first-order state. */
 int pw_is_velocity_name (const pw_reader *r, const char *name);
-
 /* Reads the name of a body or element, which must be unique. */
 int pw_build_name (pw_reader *r, const pw_node *node, const char *label, const char **name);
-
 /* Reports an error of the core at a node, without its prefix "model NAME: ". */
 int pw_build_fail (const pw_reader *r, const pw_node *node, const pw_error *cause);
 
@@ -191,13 +171,10 @@ int pw_yaml_name_path (const pw_reader *r, pw_scope *scope, const char *prefix, 
 int pw_yaml_path (pw_reader *r, const pw_node *node);
 /* Reads the outline of a body; the node may be NULL. */
 int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body);
-
 /* Reads the unit of a state or output, which are displayed in SI units, like all columns. */
 int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit);
-
 /* Reads the outputs of the file.  The columns that they read are checked by pw_add_outputs. */
 int pw_yaml_outputs (pw_reader *r);
-
 /* Adds the outputs to the model, after all elements. */
 int pw_add_outputs (pw_reader *r);
 

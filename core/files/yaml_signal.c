@@ -735,7 +735,6 @@ int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit)
 /* Reads an output but for the expression of its value. */
 static int output_head (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "value", "unit", "about", NULL };
-  const pw_renames counter = { r->copies, "", &r->states, &r->outputs, r->scope };
   const pw_node *v[sizeof key / sizeof *key];
   const char *own;
   if (pw_yaml_keys (r, node, key, "an output", v) != PW_OK) return r->error->status;
@@ -755,7 +754,7 @@ static int output_head (pw_reader *r, const pw_node *node) {
   if (r->output_count == PW_MOST_OUTPUTS)
     return read_fail (r, node->at, "a model has at most %d outputs", PW_MOST_OUTPUTS);
   o->node = *v[1];
-  if ((o->node.text = pw_yaml_renamed (&counter, v[1]->text, r->arena)) == NULL) return read_no_memory (r);
+  if ((o->node.text = pw_yaml_renamed (r, r->copies, "", v[1]->text)) == NULL) return read_no_memory (r);
   o->reader = PW_OUTPUT_UNREAD;
   o->function.name[0] = "t";
   o->output.value =
@@ -787,11 +786,10 @@ static int output_cycle (const pw_reader *r, int last, int first, size_t at) {
 /* Reads the expression of an output, after those of outputs in it. */
 static int output_expression (pw_reader *r, int index, int reads) {
   pw_output_function *o = r->output[index];
-  const pw_renames names = { NULL, r->prefix, &r->states, &r->outputs, r->scope };
   char name[PW_EXPRESSION_NAME];
   pw_column c;
   o->reader = reads;
-  if ((o->node.text = pw_yaml_renamed (&names, o->node.text, r->arena)) == NULL) return read_no_memory (r);
+  if ((o->node.text = pw_yaml_renamed (r, NULL, r->prefix, o->node.text)) == NULL) return read_no_memory (r);
   for (const char *source = o->node.text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
     const size_t at = (size_t)(p - source);
     int other = pw_names_find (&r->outputs, name), status = PW_OK;

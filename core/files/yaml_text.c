@@ -1,6 +1,5 @@
-/* The text of a model file, messages that point into it, hints in them, and its tree as bytes.
- *
- * The text is checked first: UTF-8, no control characters, no lines that begin with %: some hang libfyaml 0.7.12. */
+/* The text of a model file, messages that point into it, units of parameters, and its tree as bytes. */
+#include <ctype.h>
 #include <stdarg.h>
 #include <string.h>
 #include "yaml.h"
@@ -61,58 +60,6 @@ int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
 }
 
-const char *pw_yaml_key_hint (const char *text, const char *const *key) {
-  for (int i = 0; key[i]; i++) {
-    size_t n = strlen (key[i]);
-    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
-    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
-  }
-  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
-  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
-  return "";
-}
-
-/* Whether a word of a text begins with this prefix of at least 3 bytes. */
-static int source_has_word (const char *text, const char *prefix) {
-  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
-    if (at == text || strchr (" (", at[-1])) return 1;
-  return 0;
-}
-
-/* 1 if an element type has a field of this name. */
-static int source_is_field (const char *name) {
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    for (const pw_field *f = (*k)->fields; f->name; f++)
-      if (strcmp (f->name, name) == 0) return 1;
-  return 0;
-}
-
-pw_nearest pw_yaml_nearest_kind (const char *text) {
-  pw_nearest near = { .sought = text };
-  for (const pw_kind *const *k = pw_kinds; *k; k++) pw_nearest_try (&near, (*k)->name);
-  /* "hinge" pin, "damper" spring; names of fields, as "angle", do not suggest a type */
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !source_is_field (text); k++)
-    if (source_has_word ((*k)->about, text)) snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
-  return near;
-}
-
-int pw_yaml_check_source (const pw_yaml *y, pw_error *error) {
-  const char *begin = y->source, *p = begin + y->begin, *end = begin + y->size;
-  while (p < end) {
-    size_t at = (size_t)(p - begin);
-    int n = pw_utf8_size (p);
-    if (n == 0)
-      return pw_yaml_fail (y, error, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
-    if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
-      return pw_yaml_fail (y, error, at, "a control character, code %d, does not belong in a model file",
-                           pw_control (p));
-    if (*p == '%' && (at == 0 || p[-1] == '\n'))
-      return pw_yaml_fail (y, error, at, "a line of a model file must not begin with %%");
-    p += n;
-  }
-  return PW_OK;
-}
-
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error) {
   const char *why;
   FILE *f = pw_open_input (path, &why);
@@ -125,6 +72,77 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_erro
     memmove (y->source, y->source + 3, y->size + 1);
   }
   return status;
+}
+
+/* Units of parameters must be SI units: 40 with the unit deg would mean 40 rad. */
+
+enum { UNIT_BYTES = 400 /* of a unit of up to 60 characters with SI units in place of others, and its end */ };
+
+/* Whether a UTF-8 character is a letter, not a sign like those of multiplication (·, U+22C5) or a raised digit. */
+static int unit_is_letter (const char *character) {
+  const unsigned char first = (unsigned char)*character;
+  if (first < 0xC3 || strncmp (character, "×", 2) == 0) return isalpha (first) || strncmp (character, "µ", 2) == 0;
+  return first != 0xE2; /* U+2000 to U+2FFF */
+}
+
+/* The first place where a name is a word of its own in a text, or NULL. */
+static const char *unit_find_word (const char *text, const char *name) {
+  for (const char *at = strstr (text, name), *before; at; at = strstr (at + 1, name)) {
+    for (before = at; before > text && ((unsigned char)*--before & 0xC0) == 0x80;) continue;
+    if ((at == text || !unit_is_letter (before)) && !unit_is_letter (at + strlen (name))) return at;
+  }
+  return NULL;
+}
+
+const pw_unit_name *pw_yaml_other_unit (const char *unit, const char **at) {
+  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
+    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, unit) != 0)) continue;
+    if ((*at = unit_find_word (unit, other->name)) != NULL) return other;
+  }
+  return NULL;
+}
+
+/* Replaces the other unit, at a place in the unit, by SI units.  conversion: of a value, "*deg" or "/1e-3^2". */
+static void unit_replace (char unit[UNIT_BYTES], const pw_unit_name *other, const char *at, char conversion[40]) {
+  const char *before = at, *after = at + strlen (other->name);
+  int power;
+  pw_unit_power (after, &power);
+  while (before > unit && before[-1] == ' ') before--;
+  const int divides = before > unit && before[-1] == '/';
+  const int product = strpbrk (other->si, " /") && (divides || power != 1);
+  const char *text = PW_PRINTED (UNIT_BYTES, "%.*s%s%s%s%s", (int)(at - unit), unit, product ? "(" : "", other->si,
+                                 product ? ")" : "", after);
+  memcpy (unit, text, UNIT_BYTES);
+  snprintf (conversion, 40, power == 1 ? "%c%s" : "%c%s^%d", divides ? '/' : '*', other->factor, power);
+}
+
+/* Refuses a unit that contains this other unit than an SI unit, and says how to convert the value. */
+static int unit_refuse (const pw_yaml *y, const pw_node *node, const pw_node *value, const pw_unit_name *other,
+                        pw_error *error) {
+  const char *unit = node->text;
+  static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
+  char si[UNIT_BYTES], conversion[40];
+  const char *at;
+  double factor;
+  int replaced = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
+                             pw_expression_number (value->text, &(double){ 0 });
+  if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
+    pw_unit_factor (other->name, other->si, &factor);
+    return pw_yaml_fail (y, error, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why,
+                         other->name, factor, other->si, other->si);
+  }
+  snprintf (si, sizeof si, "%s", unit);
+  for (; (other = pw_yaml_other_unit (si, &at)) != NULL; replaced++) unit_replace (si, other, at, conversion);
+  if (replaced > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
+  return pw_yaml_fail (y, error, node->at, "%s; write \"value: %s%s, unit: %s\"", why, number ? value->text : "(..)",
+                       conversion, si);
+}
+
+int pw_yaml_check_unit (const pw_yaml *y, const pw_node *node, const pw_node *value, pw_error *error) {
+  const char *at, *unit = node->text, *in = strstr (unit, " in "); /* "persons in lane": no inches, unless a product */
+  const pw_unit_name *other = pw_yaml_other_unit (unit, &at);
+  if (other == NULL || (in && at == in + 1 && pw_unit_factor (unit, NULL, &(double){ 0 }) != PW_OK)) return PW_OK;
+  return unit_refuse (y, node, value, other, error);
 }
 
 /* Trees of text models as bytes, for programs without libfyaml: interactive pages.  A node is its type, whether it is

@@ -201,9 +201,28 @@ static int tree_syntax (tree *x) {
 /* Out of memory, libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
 enum { TREE_RESERVE = 1 << 16 };
 
+/* Checks the source from y->begin on: UTF-8, no control characters, no lines that begin with %: some of these hang
+ * libfyaml 0.7.12. */
+static int tree_check_source (const pw_yaml *y, pw_error *error) {
+  const char *begin = y->source, *p = begin + y->begin, *end = begin + y->size;
+  while (p < end) {
+    size_t at = (size_t)(p - begin);
+    int n = pw_utf8_size (p);
+    if (n == 0)
+      return pw_yaml_fail (y, error, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
+    if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
+      return pw_yaml_fail (y, error, at, "a control character, code %d, does not belong in a model file",
+                           pw_control (p));
+    if (*p == '%' && (at == 0 || p[-1] == '\n'))
+      return pw_yaml_fail (y, error, at, "a line of a model file must not begin with %%");
+    p += n;
+  }
+  return PW_OK;
+}
+
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error cause = { 0 };
-  if (pw_yaml_check_source (y, error) != PW_OK) return error->status;
+  if (tree_check_source (y, error) != PW_OK) return error->status;
   struct fy_diag_cfg quiet;
   struct fy_event *e;
   tree x = { .y = y, .error = &cause, .fed = y->begin, .offset = y->begin, .at = (unsigned)y->begin };
