@@ -250,7 +250,8 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
                   isnan (summary->stop_time) ? NULL
                                              : PW_PRINTED (400, "%.300s at t = %s s", summary->until,
                                                            pw_format ((char[32]){ 0 }, summary->stop_time, 17)));
-  pw_json_print (&j, "unbalanced: %g, redundant: [", summary->energy_defect);
+  pw_json_number (&j, "unbalanced", summary->energy_defect);
+  pw_json_open (&j, "redundant", '[');
   for (const char *const *text = summary->redundant; text && *text; text++) pw_json_text (&j, NULL, *text);
   pw_json_print (&j, "], differences: [");
   for (int i = 0, n = s ? pw_system_differences (s) : 0; i < n; i++)
