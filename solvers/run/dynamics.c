@@ -13,10 +13,8 @@
 #include "specialised.h"
 #include "util.h"
 
-/* ---- Specialised code ----
- *
- * It is compiled for one scene and serves in place of the general evaluation and projection.  It refuses states at
- * which a pivot is small or a value extreme; the general functions evaluate these. */
+/* Specialised code is compiled for one scene and serves in place of the general evaluation and projection.  It refuses
+ * states at which a pivot is small or a value extreme; the general functions evaluate these. */
 
 /* pw_scene.update: evaluates the signals for the compiled code. */
 static int specialised_update (void *workspace, double t, const double *q, const double *v) {
@@ -112,8 +110,6 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
     specialised_copy_residuals (r);
   return 1;
 }
-
-/* ---- The sine, which measures the distance from singular configurations; see method.h ---- */
 
 /* The index of the n-th body of element e; that of the ground is s->bodies. */
 static int singular_body (const pw_system *s, const pw_element_batch *k, int e, int n) {
@@ -217,8 +213,6 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
   }
   return PW_OK;
 }
-
-/* ---- General evaluation ---- */
 
 /* Adds Baumgarte's terms to gamma. */
 __attribute__ ((noinline)) static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
@@ -419,8 +413,6 @@ double pw_run_option (const pw_run *r, const char *name) {
   while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
   return r->method->options[i].name ? r->option[i] : 0;
 }
-
-/* ---- Sides of conditions in signals (sides.c) ---- */
 
 /* Fixes the sides at a state; q NULL: frees them. */
 static void sides_fix (pw_run *r, double t, const double *q, const double *v) {

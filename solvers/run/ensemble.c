@@ -12,10 +12,6 @@ typedef struct {
   int first, last;
 } ensemble_part;
 
-static int ensemble_fail_memory (const pw_ensemble *e, int i) {
-  return e->status[i] = pw_fail (&e->error[i], PW_RESOURCE, "out of memory");
-}
-
 /* Sets the inputs of run i; *t_end: where its step ends.  1 if it can be stepped. */
 static int ensemble_begin (const pw_ensemble *e, int i, double dt, double *t_end) {
   pw_error *error = &e->error[i];
@@ -53,21 +49,17 @@ static void ensemble_step_lanes (const pw_ensemble *e, int first, int last, doub
   }
 }
 
-/* 1 if the numbers that are observed are time and states, which need no sample. */
-static int ensemble_observes_states (const pw_ensemble *e, const pw_system *s) {
-  int states = 1;
-  for (int k = 0; k < e->columns; k++)
-    states &=
-        e->column[k] == 0 || (e->column[k] >= PW_RECORD_STATES && e->column[k] < PW_RECORD_STATES + 2 * s->coords);
-  return states;
-}
-
 static void ensemble_observe_run (const pw_ensemble *e, int i) {
   pw_run *r = e->run[i];
   double *out = e->observed + (size_t)i * (size_t)e->columns;
-  for (int k = 0; k < e->columns; k++) out[k] = NAN;
+  int states = r != NULL; /* 1: time and states alone are observed, which need no sample */
+  for (int k = 0; k < e->columns; k++) {
+    const int j = e->column[k] - PW_RECORD_STATES;
+    out[k] = NAN;
+    states &= e->column[k] == 0 || (r && j >= 0 && j < 2 * r->s->coords);
+  }
   if (e->status[i] != PW_OK) return;
-  if (r && ensemble_observes_states (e, r->s)) {
+  if (states) {
     for (int k = 0; k < e->columns; k++) {
       const int j = e->column[k] - PW_RECORD_STATES;
       out[k] = j < 0 ? r->t : j < r->s->coords ? r->q[j] : r->v[j - r->s->coords];
@@ -78,7 +70,7 @@ static void ensemble_observe_run (const pw_ensemble *e, int i) {
   if (r == NULL)
     e->status[i] = pw_require (r, "a run", &e->error[i]);
   else if (row == NULL)
-    ensemble_fail_memory (e, i);
+    e->status[i] = pw_fail (&e->error[i], PW_RESOURCE, "out of memory");
   else
     e->status[i] = pw_record_row (r, r->t, row, &e->error[i]);
   for (int k = 0; k < e->columns && e->status[i] == PW_OK; k++) out[k] = row[e->column[k]];

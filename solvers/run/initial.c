@@ -130,8 +130,6 @@ static void initial_release (initial_search *x) {
     if (initial_is_free (x, i)) x->residual[i] = 0;
 }
 
-/* ---- Linear systems ---- */
-
 /* The matrix, or its pattern while the map is recorded; columns of prescribed values are those of the identity.
  * damping: relative to the largest diagonal entry of G W^-1 G^T, for all equations alike; 0: for Newton's method, to
  * the round-off of each entry, so that dependent equations have a solution. */
@@ -198,8 +196,6 @@ static void initial_units (initial_search *x) {
     if (x->diagonal[i] == 0) x->diagonal[i] = x->damping_unit * x->unit[i] * x->unit[i];
 }
 
-/* ---- Weights, changes ---- */
-
 /* Factor of the metric of massless coordinates, by which it becomes 1e-6 of the least entry of the mass matrix (angles
  * in units of L), but at least 1e-12 of the largest.  (In the system's metric it refers to the mean entry, which
  * unrelated massive bodies may determine.) */
@@ -263,8 +259,6 @@ static initial_change initial_changes (const initial_search *x) {
   }
   return change;
 }
-
-/* ---- Positions near given ones ---- */
 
 /* The sum of squares of x->residual in its units at the positions x->value, and the worst one; INFINITY if it is not
  * finite, or if a signal failed. */
@@ -368,17 +362,6 @@ static void initial_relax (initial_search *x) {
   }
 }
 
-/* The n-th start: free values are moved, in later ones candidates too. */
-static void initial_begin (initial_search *x, int n, int free) {
-  const int starts = (int)(sizeof initial_start / sizeof *initial_start),
-            all = free == 0 || (n >= starts && n % 2 == 1);
-  const double distance = initial_start[n < starts ? n : starts - 1];
-  for (int j = 0; j < x->s->coords; j++) {
-    const int moves = !x->unused[j] && (all || x->importance[j] < INITIAL_SPECIFIED);
-    x->value[j] = x->given[j] + (moves ? distance * pw_unit (x->s, j) * pw_irregular (n, j + 1) : 0);
-  }
-}
-
 /* Takes whole turns out of the changes of free angles, if the constraints allow it. */
 static void initial_unwind (initial_search *x) {
   const size_t bytes = (size_t)x->s->coords * sizeof (double);
@@ -405,11 +388,17 @@ static int initial_search_positions (initial_search *x) {
   initial_change best = { .sum = INFINITY };
   for (int j = 0; j < s->coords; j++) free += x->importance[j] < INITIAL_SPECIFIED && !x->unused[j];
   for (int n = 0; n < starts && !(found && (free == 0 || n > INITIAL_STARTS_FOUND)); n++) {
+    const int near = (int)(sizeof initial_start / sizeof *initial_start);
+    const int all = free == 0 || (n >= near && n % 2 == 1); /* 1: candidates are moved, too, not free values alone */
     int converged = 0, begun = INITIAL_FREE;
     for (const struct initial_stage *stage = initial_stage; stage < initial_stage + INITIAL_STAGES && !converged;
          stage++) {
       if (!initial_uses_stage (x, stage, n)) continue;
-      if (stage->prescribed != begun && stage->prescribed < INITIAL_KEPT) initial_begin (x, n, free);
+      for (int j = 0; j < s->coords && stage->prescribed != begun && stage->prescribed < INITIAL_KEPT; j++) {
+        const int moves = !x->unused[j] && (all || x->importance[j] < INITIAL_SPECIFIED);
+        const double distance = initial_start[n < near ? n : near - 1] * pw_unit (s, j) * pw_irregular (n, j + 1);
+        x->value[j] = x->given[j] + (moves ? distance : 0);
+      }
       begun = stage->prescribed;
       initial_stage_weights (x, stage);
       converged = initial_converge (x, INITIAL_ITERATIONS);
@@ -430,8 +419,6 @@ static int initial_search_positions (initial_search *x) {
   if (found) memcpy (x->value, x->best, bytes);
   return found ? PW_OK : PW_RETRY;
 }
-
-/* ---- Prescribed values ---- */
 
 /* Moves the positions kept to their values, in steps, from the consistent ones x->value.  PW_RETRY: they cannot be
  * reached with turns of at most INITIAL_STEP in a step, and steps of at least this part of the way. */
@@ -461,21 +448,27 @@ static int initial_reach (initial_search *x, double least_part) {
   return done == 1 ? PW_OK : PW_RETRY;
 }
 
+/* x->residual = J v - eta, of equations that are enforced, at the kinematics and J last evaluated. */
+static void initial_velocity_residual (initial_search *x, const double *v) {
+  double *eta = x->r->scratch;
+  pw_mul_J (x->r->w, v, x->residual);
+  pw_evaluate_eta (x->r->w, eta);
+  for (int i = 0; i < x->rows; i++) x->residual[i] -= eta[i];
+  initial_release (x);
+}
+
 /* Velocities nearest to the described ones in the weights, at the kinematics and J last evaluated. */
 static int initial_project_velocities (initial_search *x) {
   pw_run *r = x->r;
   const int n = x->s->coords;
-  double previous = INFINITY, *eta = r->scratch;
+  double previous = INFINITY;
   pw_residuals now;
   memcpy (x->value, x->given, (size_t)n * sizeof (double));
   initial_units (x);
   for (;;) {
     if (pw_update_velocities (r->w, x->value) != PW_OK) return PW_METHOD;
     pw_evaluate_residuals (r->w, r->enforced, &now);
-    pw_mul_J (r->w, x->value, x->residual);
-    pw_evaluate_eta (r->w, eta);
-    for (int i = 0; i < x->rows; i++) x->residual[i] -= eta[i];
-    initial_release (x);
+    initial_velocity_residual (x, x->value);
     if (now.velocity <= PW_RESIDUAL_CONVERGED) return PW_OK;
     if (!(now.velocity <= previous / 4) || initial_solve (x, 0, NULL) != PW_OK) break;
     previous = now.velocity;
@@ -495,8 +488,6 @@ static int initial_prescribe_velocities (initial_search *x, int importance) {
   initial_weights (x, x->s->metric, importance);
   return initial_project_velocities (x);
 }
-
-/* ---- Selection ---- */
 
 /* Columns of L of a decomposition of G by columns, divided by their pivots. */
 typedef struct {
@@ -612,8 +603,6 @@ static int initial_select (initial_search *x) {
   return status < 0 ? PW_RESOURCE : PW_OK;
 }
 
-/* ---- Candidates ---- */
-
 /* Prescribes list[first] .. list[end - 1] and what is kept already.  PW_RETRY, with nothing changed, if that is
  * impossible or changes other candidates too much. */
 static int initial_try (initial_search *x, int first, int end) {
@@ -653,17 +642,6 @@ static int initial_keep_list (initial_search *x, int count) {
   return status < 0 ? status : released;
 }
 
-/* Lists candidates that can be prescribed with those kept, the most important ones first; returns their number. */
-static int initial_list_independent (initial_search *x) {
-  int count = 0;
-  for (int importance = INITIAL_KEPT - 1; importance >= INITIAL_SPECIFIED; importance--)
-    for (int m = 0; m < x->s->coords; m++) {
-      const int j = initial_order (x, m);
-      if (x->importance[j] == importance && !x->basis[j]) x->list[count++] = j;
-    }
-  return count;
-}
-
 /* Lists candidates that differ from their values by round-off alone. */
 static int initial_list_round (initial_search *x) {
   int count = 0, differ = 0;
@@ -684,7 +662,13 @@ static int initial_keep (initial_search *x) {
     if (x->level == INITIAL_POSITIONS && pw_evaluate_J_at (x->r->w, x->r->t, x->r->q, x->r->v) != PW_OK)
       return PW_METHOD;
     if (initial_select (x) != PW_OK) return PW_RESOURCE;
-    released = initial_keep_list (x, initial_list_independent (x));
+    int count = 0; /* candidates that can be prescribed with those kept, the most important ones first */
+    for (int importance = INITIAL_KEPT - 1; importance >= INITIAL_SPECIFIED; importance--)
+      for (int m = 0; m < x->s->coords; m++) {
+        const int j = initial_order (x, m);
+        if (x->importance[j] == importance && !x->basis[j]) x->list[count++] = j;
+      }
+    released = initial_keep_list (x, count);
     if (released < 0) return released;
   }
   for (int j = 0; j < x->s->coords; j++)
@@ -693,8 +677,6 @@ static int initial_keep (initial_search *x) {
   if (status >= 0) status = initial_keep_list (x, initial_list_round (x));
   return status < 0 ? status : PW_OK;
 }
-
-/* ---- The two levels ---- */
 
 /* origin: of all positions and velocities, or NULL. */
 static void initial_rank (initial_search *x, const unsigned char *origin) {
@@ -785,15 +767,12 @@ static int initial_find (initial_search *x) {
  * violated, since a combination of these equations has no velocity in it.  0 if there is none. */
 static int initial_contradiction (initial_search *x, char *text, size_t size) {
   const pw_system *s = x->s;
-  double *eta = x->r->scratch, *Jv = eta + s->rows, most = 0;
-  unsigned char *violated = (unsigned char *)eta;
+  double *Jv = x->r->scratch + s->rows, most = 0;
+  unsigned char *violated = (unsigned char *)x->r->scratch;
   memset (x->importance, INITIAL_FREE, (size_t)s->coords);
   initial_stage_weights (x, &initial_least_change);
   initial_units (x);
-  pw_mul_J (x->r->w, x->given, x->residual);
-  pw_evaluate_eta (x->r->w, eta);
-  for (int i = 0; i < s->rows; i++) x->residual[i] -= eta[i];
-  initial_release (x);
+  initial_velocity_residual (x, x->given);
   if (initial_solve (x, INITIAL_LEAST_SQUARES, NULL) != PW_OK) return 0;
   pw_mul_J (x->r->w, x->step, Jv);
   for (int i = 0; i < s->rows; i++) {
@@ -805,7 +784,6 @@ static int initial_contradiction (initial_search *x, char *text, size_t size) {
   return *text != 0;
 }
 
-/* The unit of the residual of a position equation. */
 static const char *initial_unit (const pw_system *s, int row) {
   return strcmp (pw_system_reaction_unit (s, row), "N m") == 0 ? "rad" : "m";
 }
@@ -826,7 +804,6 @@ static int initial_fail (initial_search *x, pw_error *error) {
       s->model, PW_NAME (pw_system_row_name, s, x->failed_row), x->failed_by, initial_unit (s, x->failed_row));
 }
 
-/* Makes positions, or velocities at consistent positions, consistent. */
 static int initial_level_consistent (pw_run *r, initial_level level, const unsigned char *origin, pw_error *error) {
   initial_search x;
   if (r->inconsistent) return PW_OK;
@@ -840,8 +817,6 @@ static int initial_level_consistent (pw_run *r, initial_level level, const unsig
   free (x.memory);
   return status;
 }
-
-/* ---- Report ---- */
 
 int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state) {
   int is_velocity = state >= s->coords, j = is_velocity ? state - s->coords : state;

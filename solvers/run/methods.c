@@ -70,12 +70,6 @@ static int methods_stabilisation (const pw_method *method, const char *name, int
   return pw_fail (error, PW_INPUT, "integrator %s has no stabilisation \"%s\"%s", method->name, name, hint);
 }
 
-static int methods_choice (const pw_option *o, const char *text, double *value, pw_error *error) {
-  char hint[PW_HINT];
-  *value = pw_find_name (o->choices, sizeof *o->choices, text, hint);
-  return *value < 0 ? pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text, hint) : PW_OK;
-}
-
 /* Reads a decimal number, with a point whatever the locale. */
 static int methods_number (const pw_option *o, const char *text, double *value, pw_error *error) {
   locale_t c_locale = newlocale (LC_ALL_MASK, "C", (locale_t)0);
@@ -94,7 +88,7 @@ static int methods_number (const pw_option *o, const char *text, double *value, 
  * been read. */
 static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, unsigned *given,
                            pw_error *error) {
-  char *equals = strchr (part, '=');
+  char *equals = strchr (part, '='), hint[PW_HINT];
   const char *with = method->stabilisations[stabilisation].name;
   if (equals == NULL) return pw_fail (error, PW_INPUT, "method option \"%s\": expected NAME=VALUE", part);
   *equals = 0;
@@ -106,8 +100,10 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
     if (strcmp (o->name, part) != 0) continue;
     if (*given & 1U << i) return pw_fail (error, PW_INPUT, "method option %s is given twice", part);
     *given |= 1U << i;
-    return o->choices ? methods_choice (o, equals + 1, values + i, error)
-                      : methods_number (o, equals + 1, values + i, error);
+    if (o->choices == NULL) return methods_number (o, equals + 1, values + i, error);
+    values[i] = pw_find_name (o->choices, sizeof *o->choices, equals + 1, hint);
+    if (values[i] >= 0) return PW_OK;
+    return pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, equals + 1, hint);
   }
   return pw_fail (error, PW_INPUT, "method %s+%s has no option \"%s\"%s", method->name, with, part,
                   pw_nearest_text (&near));

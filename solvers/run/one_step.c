@@ -27,8 +27,6 @@ double pw_stage_time (const pw_run *r, double t) {
   return pw_before_breakpoint (r, t);
 }
 
-/* ---- Opening ---- */
-
 int pw_step_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
@@ -65,8 +63,6 @@ void pw_step_serialise (pw_run *r, pw_archive *a) {
 double *pw_step_array (pw_run *r, int i) {
   return r->data->array + (size_t)i * r->data->length;
 }
-
-/* ---- Steps ---- */
 
 double pw_step_size (pw_run *r, double t_end) {
   struct pw_method_data *d = r->data;

@@ -11,25 +11,20 @@
 #include "method.h"
 #include "specialised.h"
 
-/* The saddle of the position projection with the mass matrix as metric.  Massless coordinates do not contribute to the
- * norm: the constraint equations determine them, as in the accelerations, and coordinates with mass do not move because
- * of them.  If the holonomic equations do not determine all of them, the run's saddle is used, which contains all
- * equations: the change of positions then satisfies the nonholonomic ones, too. */
-static pw_saddle *project_open_mass_metric (pw_run *r, pw_error *error) {
-  pw_error cause = { 0 };
-  pw_saddle *saddle = pw_saddle_open (r->w, r->s->mass, r->s->holonomic, r->active, &cause);
-  if (cause.status == PW_RESOURCE) pw_fail (error, PW_RESOURCE, "%s", cause.text);
-  return saddle || cause.status == PW_RESOURCE ? saddle : r->saddle;
-}
-
+/* With the mass matrix as metric of positions massless coordinates do not contribute to the norm: the constraint
+ * equations determine them, as in the accelerations, and coordinates with mass do not move because of them.  If the
+ * holonomic equations do not determine all of them, the run's saddle is used, which contains all equations: the change
+ * of positions then satisfies the nonholonomic ones, too. */
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
   const pw_system *s = r->s;
   *p = (pw_projector){ .owns_velocity = weight_v != NULL,
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
                        .contradictory_row = -1 };
-  p->position =
-      weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_open_mass_metric (r, error);
+  pw_error cause = { 0 };
+  p->position = pw_saddle_open (r->w, weight_q ? weight_q : s->mass, s->holonomic, r->active, &cause);
+  if (p->position == NULL && !weight_q && cause.status != PW_RESOURCE) p->position = r->saddle;
+  if (p->position == NULL) pw_fail (error, cause.status, "%s", cause.text);
   p->owns_position = p->position != r->saddle;
   if (p->owns_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;

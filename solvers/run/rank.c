@@ -58,8 +58,6 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   }
 }
 
-/* ---- Independent rows ---- */
-
 /* Independent rows of J.  Those that belong to every maximal independent set are found by their pattern; of the others,
  * an orthonormal basis is kept. */
 typedef struct {
@@ -111,17 +109,6 @@ static void rank_read (rank_basis *b, const pw_workspace *w) {
   b->first[w->s->rows] = entry;
 }
 
-/* Takes a row out of the counts of its columns; those that it leaves to one other row are queued. */
-static int rank_take (rank_basis *b, int i, int queued) {
-  b->active[i] = 1;
-  for (int c = b->first[i]; c < b->first[i + 1]; c++) {
-    if (b->value[c] == 0) continue;
-    b->sum[b->column[c]] -= i;
-    if (--b->count[b->column[c]] == 1) b->queue[queued++] = b->column[c];
-  }
-  return queued;
-}
-
 /* Activates the rows that belong to every maximal independent set: those that alone have an entry in some column, then
  * those for which this holds without them, and so on.  The pins of a tree of bodies are all of this kind.  In small
  * scenes they stay in the basis, so that of the others the most independent of them, too, are selected. */
@@ -141,7 +128,13 @@ static void rank_take_private (rank_basis *b, const pw_system *s) {
     int j = b->queue[n], i = (int)b->sum[j], c = b->first[i];
     if (b->count[j] != 1) continue;
     while (b->column[c] != j || b->value[c] == 0) c++;
-    if (fabs (b->value[c]) >= least) queued = rank_take (b, i, queued);
+    if (!(fabs (b->value[c]) >= least)) continue;
+    b->active[i] = 1; /* out of the counts of its columns; those that it leaves to one other row are queued */
+    for (c = b->first[i]; c < b->first[i + 1]; c++) {
+      if (b->value[c] == 0) continue;
+      b->sum[b->column[c]] -= i;
+      if (--b->count[b->column[c]] == 1) b->queue[queued++] = b->column[c];
+    }
   }
 }
 
@@ -223,8 +216,6 @@ static int rank_select (rank_basis *b, const pw_workspace *w, double tol, int ma
   return all + b->rank;
 }
 
-/* ---- Redundant rows as combinations of the active ones ---- */
-
 /* A redundant row of J is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle-point system:
  * with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum_a c_ia e_a, with unit vectors e,
  * span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + N z, N = [n_1 n_2 ...], with z
@@ -269,16 +260,6 @@ double pw_rank_independence (pw_run *r) {
   return isnan (most) ? 0 : 1 / most;
 }
 
-/* slope = -N^T (lambda / square), without entries for active rows; (c_i, x) = J_i a with J_a a = x. */
-static void redundancy_slope (pw_run *r, const double *lambda, const double *square, double *slope) {
-  double *x = r->coefficient, *a = r->row_force;
-  for (int i = 0; i < r->s->rows; i++) x[i] = r->active[i] ? lambda[i] / square[i] : 0;
-  pw_saddle_solve (r->saddle, NULL, x, a, x);
-  pw_mul_J (r->w, a, slope);
-  for (int i = 0; i < r->s->rows; i++) slope[i] = r->active[i] ? 0 : slope[i] - lambda[i] / square[i];
-  memset (a, 0, (size_t)r->s->coords * sizeof *a);
-}
-
 /* sum x_i y_i scale_i, or with inverse = 1 sum x_i y_i / scale_i */
 static double redundancy_product (const pw_run *r, const double *x, const double *y, const double *square,
                                   int inverse) {
@@ -293,26 +274,26 @@ static double redundancy_product (const pw_run *r, const double *x, const double
 void pw_rank_least_norm (pw_run *r, double *lambda) {
   const double accepted = 1e-14;
   const int rows = r->s->rows, most = r->redundant < rows - r->redundant ? r->redundant : rows - r->redundant + 1;
-  double *square = r->coefficient + rows, *slope = square + rows, *z = slope + rows, *change = z + rows, before = 0;
+  double *x = r->coefficient, *square = x + rows, *slope = square + rows, *z = slope + rows, *change = z + rows,
+         *a = r->row_force, before = 0;
   for (int i = 0; i < rows; i++) square[i] = pow (pw_rank_multiplier_unit (r->w, i), 2), z[i] = 0;
   for (int n = 0; n <= most; n++) {
-    redundancy_slope (r, lambda, square, slope);
+    /* slope = -N^T (lambda / square), without entries for active rows; (c_i, x) = J_i a with J_a a = x */
+    for (int i = 0; i < rows; i++) x[i] = r->active[i] ? lambda[i] / square[i] : 0;
+    pw_saddle_solve (r->saddle, NULL, x, a, x);
+    pw_mul_J (r->w, a, slope);
+    for (int i = 0; i < rows; i++) slope[i] = r->active[i] ? 0 : slope[i] - lambda[i] / square[i];
+    memset (a, 0, (size_t)r->s->coords * sizeof *a);
     double now = redundancy_product (r, slope, slope, square, 0);
     if (now <= accepted * accepted * redundancy_product (r, lambda, lambda, square, 1)) return;
     for (int i = 0; i < rows; i++) z[i] = slope[i] * square[i] + (n > 0 ? now / before * z[i] : 0);
-    pw_add_JT (r->w, z, r->row_force);
-    redundancy_solve (r, r->coefficient);
-    for (int i = 0; i < rows; i++)
-      change[i] = z[i] - r->coefficient[i]; /* N z; z has entries for redundant rows only */
+    pw_add_JT (r->w, z, a);
+    redundancy_solve (r, x);
+    for (int i = 0; i < rows; i++) change[i] = z[i] - x[i]; /* N z; z has entries for redundant rows only */
     double length = now / redundancy_product (r, change, change, square, 1);
     for (int i = 0; i < rows; i++) lambda[i] += length * change[i];
     before = now;
   }
-}
-
-static void redundancy_append (char *buffer, size_t size, const char *text) {
-  size_t n = strlen (buffer);
-  snprintf (buffer + n, size - n, "%s", text);
 }
 
 /* The common direction of two reactions "ELEMENT.N" or the like: "lateral ", or "". */
@@ -361,16 +342,21 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
     const char *element = PW_NAME (pw_system_row_name, s, a);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
     strcpy (before, element);
-    redundancy_append (buffer, size, elements == MAX_ELEMENTS ? " and others" : elements > 0 ? ", " : " follows from ");
-    if (elements++ < MAX_ELEMENTS) redundancy_append (buffer, size, element);
+    const size_t n = strlen (buffer);
+    snprintf (buffer + n, size - n, "%s%s",
+              elements == MAX_ELEMENTS ? " and others"
+              : elements > 0           ? ", "
+                                       : " follows from ",
+              elements < MAX_ELEMENTS ? element : "");
+    elements++;
   }
-  if (partners == 0) redundancy_append (buffer, size, " has no effect in this configuration");
-  if (partners > 1 && elements == 0) redundancy_append (buffer, size, " follows from its other equations");
+  const char *other = partners == 0 ? " has no effect in this configuration"
+                      : elements    ? ""
+                                    : " follows from its other equations";
+  if (partners != 1) strncat (buffer, other, size - strlen (buffer) - 1);
   if (partners == 1) redundancy_describe_pair (s, last, row, buffer, size);
   return buffer;
 }
-
-/* ---- The rows that a run enforces ---- */
 
 /* The number of configurations nearby, and their distance in units of L and rad: far enough for sines well above the
  * threshold `independent`, near enough for the projection to converge. */

@@ -41,9 +41,7 @@ struct pw_resolution {
   double *lo, *hi;         /* of the time and the states that a signal reads */
 };
 
-/* ---- Values and bounds at the time t + s ---- */
-
-/* The prediction of state j, an index as in pw_source.state. */
+/* The prediction of state j, an index as in pw_source.state, at the time t + s. */
 static double resolution_state (const pw_run *r, int j, double s) {
   const int n = r->s->coords;
   return j < n ? r->q[j] + s * (r->v[j] + 0.5 * s * r->a[j]) : r->v[j - n] + s * r->a[j - n];
@@ -90,9 +88,6 @@ static int resolution_is_near (pw_run *r, resolution_signal *x, double a, double
   return 1;
 }
 
-/* ---- The time that is resolved ---- */
-
-/* 1 if the next time H is resolved. */
 static int resolution_resolved (pw_run *r, resolution_signal *x, double H) {
   const double m = H / 2, y0 = resolution_value (r, x, 0), y1 = resolution_value (r, x, m),
                y2 = resolution_value (r, x, H), rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol;
@@ -159,8 +154,6 @@ char *pw_run_unresolved (const pw_run *r, char *signal, size_t size) {
   return signal;
 }
 
-/* ---- Opening ---- */
-
 /* The largest acceleration [velocity units / s] per unit of a force's signal; 0: unknown.  Constraints are left out:
  * they can only reduce it (Gauss' principle). */
 static double resolution_effect (pw_run *r, const pw_source *source) {
@@ -179,24 +172,6 @@ static double resolution_effect (pw_run *r, const pw_source *source) {
   return most < INFINITY ? most : 0;
 }
 
-/* The largest magnitude of a signal in all states during the run; 1: unknown. */
-static double resolution_size (pw_run *r, const pw_source *source) {
-  struct pw_resolution *d = r->resolution;
-  double bounds[2];
-  d->lo[0] = r->t, d->hi[0] = r->t + r->settings.span;
-  for (int i = 1; i <= source->reads; i++) d->lo[i] = -DBL_MAX, d->hi[i] = DBL_MAX;
-  pw_signal_bounds (source, d->lo, d->hi, bounds);
-  const double size = fmax (fabs (bounds[0]), fabs (bounds[1]));
-  return size > 1e-100 && size < 1e100 ? size : 1; /* a signal of 0 has bounds next to 0 */
-}
-
-/* The longest step that a harmonic signal permits: half a period, or longer if its effect is within the tolerance. */
-static double resolution_harmonic (pw_run *r, const pw_source *source) {
-  const double rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol, effect = resolution_effect (r, source);
-  const double A = fabs (source->signal.harmonic.amplitude), half = PW_PI / fabs (source->signal.harmonic.omega);
-  return A == 0 ? INFINITY : effect > 0 ? fmax (half, RESOLUTION_SHARE * rtol / (effect * A)) : half;
-}
-
 int pw_resolution_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   struct pw_resolution *d, found = { .harmonic = INFINITY };
@@ -205,7 +180,10 @@ int pw_resolution_open (pw_run *r, pw_error *error) {
     const int bounded = pw_signal_is_bounded (source);
     found.count += bounded, most = source->reads > most ? source->reads : most, reads += bounded ? source->reads : 0;
     if (source->signal.type != PW_HARMONIC || source->of_coordinate) continue;
-    const double longest = resolution_harmonic (r, source);
+    const double rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol, effect = resolution_effect (r, source);
+    const double A = fabs (source->signal.harmonic.amplitude), half = PW_PI / fabs (source->signal.harmonic.omega);
+    /* half a period, or longer if its effect is within the tolerance */
+    const double longest = A == 0 ? INFINITY : effect > 0 ? fmax (half, RESOLUTION_SHARE * rtol / (effect * A)) : half;
     if (longest < found.harmonic) found.harmonic = longest, found.missed = source;
   }
   if (found.count == 0 && !(found.harmonic < (r->fixed_steps ? r->settings.step : INFINITY))) return PW_OK;
@@ -217,8 +195,13 @@ int pw_resolution_open (pw_run *r, pw_error *error) {
   d->signal = signal, d->lo = x, d->hi = x + most + 1, x += 2 * (most + 1);
   for (const pw_source *source = r->w->source; source < r->w->source + s->sources; source++) {
     if (!pw_signal_is_bounded (source)) continue;
-    *signal = (resolution_signal){ .at = *source, .source = source };
-    signal->effect = resolution_effect (r, source), signal->size = resolution_size (r, source);
+    double bounds[2]; /* in all states during the run */
+    d->lo[0] = r->t, d->hi[0] = r->t + r->settings.span;
+    for (int i = 1; i <= source->reads; i++) d->lo[i] = -DBL_MAX, d->hi[i] = DBL_MAX;
+    pw_signal_bounds (source, d->lo, d->hi, bounds);
+    const double size = fmax (fabs (bounds[0]), fabs (bounds[1]));
+    *signal = (resolution_signal){ .at = *source, .source = source, .effect = resolution_effect (r, source) };
+    signal->size = size > 1e-100 && size < 1e100 ? size : 1; /* a signal of 0 has bounds next to 0 */
     signal->at.u = x, signal->at.x = x + 3, x += 3 + 2 * source->reads;
     signal++;
   }

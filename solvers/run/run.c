@@ -90,16 +90,6 @@ void pw_run_close (pw_run *r) {
   free (r);
 }
 
-/* Restarts the method after a discontinuity, where accelerations change, or a step that was interrupted. */
-static int run_restart_method (pw_run *r, pw_error *error) {
-  int status = pw_run_look_ahead (r, error);
-  r->jumped = 1;
-  r->predicted = 0;
-  pw_run_fix_sides (r);
-  if (status == PW_OK) status = pw_run_evaluate (r, error);
-  return status == PW_OK ? r->method->restart (r, error) : status;
-}
-
 int pw_run_renew (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->watchdog.singular_ahead = 1;
@@ -118,10 +108,16 @@ int pw_run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
+/* Restarts the method after a discontinuity, where accelerations change, or a step that was interrupted. */
 int pw_run_settle (pw_run *r, pw_error *error) {
   if (!r->interrupted) return PW_OK;
   if (pw_run_has_no_method (r, error)) return PW_RESOURCE;
-  const int status = run_restart_method (r, error);
+  int status = pw_run_look_ahead (r, error);
+  r->jumped = 1;
+  r->predicted = 0;
+  pw_run_fix_sides (r);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
+  if (status == PW_OK) status = r->method->restart (r, error);
   if (status == PW_OK) r->interrupted = 0;
   return status;
 }
@@ -141,7 +137,6 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Computes r->independence with the J last evaluated. */
 static void run_measure_independence (pw_run *r) {
   if (r->redundant) r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
 }
@@ -426,7 +421,6 @@ void pw_ledger_record (pw_run *r) {
     ledger_record_energies (r);
 }
 
-/* Multipliers of all equations from those of the active ones. */
 static const double *ledger_multipliers (pw_run *r, const double *lambda) {
   double *all = r->enforced ? r->scratch : r->least_norm;
   if (r->enforced == NULL && pw_saddle_factor (r->saddle) != PW_OK) return lambda;

@@ -13,7 +13,6 @@
 #define RUN_LEAST_RTOL (100 * DBL_EPSILON) /* round-off exceeds smaller tolerances */
 #define RUN_MOST_STEPS 1e15                /* of a fixed size: shorter ones vanish in the round-off of the time */
 
-/* Checks the settings of a run and fills in defaults. */
 static int run_settings (pw_settings *to, const pw_settings *from, int fixed_steps, pw_error *error) {
   const struct {
     const char *name;
@@ -100,16 +99,6 @@ static double run_time_scale (const pw_run *r) {
   return 1 / fastest;
 }
 
-static void run_absolute_tolerances (pw_run *r) {
-  const double rtol = r->settings.rtol, given = r->settings.atol;
-  for (int j = 0, n = r->s->coords; j < n; j++) {
-    const int is_state = j >= r->s->mechanical;
-    const double unit = is_state ? 1 : pw_unit (r->s, j), T = is_state ? 1 : r->w->scale.time;
-    r->atol[j] = is_state ? INFINITY : given > 0 ? given : rtol * unit;
-    r->atol[n + j] = given > 0 ? given : rtol * unit / T;
-  }
-}
-
 /* After a part of the opening: PW_STOPPED if the caller requests it. */
 static int run_check_stop (pw_run *r, int status) {
   return status >= PW_OK && pw_run_stop_opening (r) ? PW_STOPPED : status;
@@ -178,8 +167,6 @@ int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw
       r->s->model, block, user, needs);
 }
 
-/* ---- Identity: what a saved state must share with the run that loads it ---- */
-
 static void checkpoint_add_text (unsigned long long *sum, const char *text) {
   *sum = pw_check_sum (*sum, text, strlen (text) + 1);
 }
@@ -232,8 +219,6 @@ static unsigned long long checkpoint_identity (const pw_run *r) {
   return sum;
 }
 
-/* ---- Opening ---- */
-
 /* The function that makes a step, without regard to signals. */
 static int (*run_step (const pw_run *r)) (pw_run *r, double t_end, pw_error *error) {
   return r->events && !r->method->locates_no_events ? pw_events_advance : r->method->advance;
@@ -285,7 +270,12 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (r->events && status == PW_OK) r->w->scale.time = run_time_scale (r);
   r->advance = run_step (r);
   if (status != PW_OK) return status;
-  run_absolute_tolerances (r);
+  for (int j = 0, n = r->s->coords; j < n; j++) {
+    const int is_state = j >= r->s->mechanical;
+    const double rtol = r->settings.rtol, given = r->settings.atol, unit = is_state ? 1 : pw_unit (r->s, j);
+    r->atol[j] = is_state ? INFINITY : given > 0 ? given : rtol * unit;
+    r->atol[n + j] = given > 0 ? given : rtol * unit / (is_state ? 1 : r->w->scale.time);
+  }
   pw_run_count_moved (r);
   pw_run_set_reference_level (r);
   pw_forget_residuals (r);
@@ -328,8 +318,6 @@ pw_run *pw_run_open_inconsistent (const pw_system *s, const char *method, const 
   return run_new (s, method, settings, 1, error);
 }
 
-/* ---- Restart ---- */
-
 /* Checks given positions or velocities x, whose states begin at `first`; NULL: none are given. */
 static int restart_check (const pw_run *r, const double *x, int first, pw_error *error) {
   for (int j = 0, n = r->s->coords; x && j < n; j++)
@@ -337,19 +325,6 @@ static int restart_check (const pw_run *r, const double *x, int first, pw_error 
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
                       PW_NAME (pw_system_state_name, r->s, first + j), x[j], r->thresholds.extreme);
   return PW_OK;
-}
-
-/* Makes (q, v) the state reached; moves the previous one to the sample arrays and the values given before to
- * r->given_before.  q and v may be in the sample arrays; NULL: unchanged. */
-static void restart_exchange (pw_run *r, const double *q, const double *v) {
-  size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
-  double *given = r->scratch;
-  memcpy (given, q ? q : r->q, bytes);
-  memcpy (given + n, v ? v : r->v, bytes);
-  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
-  memcpy (r->given_before, r->q_given, 2 * (n + 3) * sizeof *q);
-  memcpy (r->q, given, bytes);
-  memcpy (r->v, given + n, bytes);
 }
 
 static int restart_energy (pw_run *r, double *energy, pw_error *error) {
@@ -382,10 +357,12 @@ static void restart_keep (pw_run *r, pw_archive *a) {
 }
 
 /* A change of energy by the caller is not an error of the method: it is added to the initial energy.  The caller's
- * functions may return other values and breakpoints than before. */
+ * functions may return other values and breakpoints than before.  The previous state moves to the sample arrays, in
+ * which q and v may be, and the values given before to r->given_before. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  double before = 0, after = 0;
+  double before = 0, after = 0, *given = r->scratch;
+  const size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
   if (pw_run_has_no_method (r, error)) return PW_RESOURCE;
   if (restart_check (r, q, 0, error) != PW_OK || restart_check (r, v, r->s->coords, error) != PW_OK) return PW_INPUT;
   r->w->failed = NULL;
@@ -399,7 +376,12 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   restart_keep (r, &kept);
   if (kept.failed) return pw_fail_memory (r->s, error);
   r->w->t_signal = NAN;
-  restart_exchange (r, q, v);
+  memcpy (given, q ? q : r->q, bytes);
+  memcpy (given + n, v ? v : r->v, bytes);
+  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
+  memcpy (r->given_before, r->q_given, 2 * (n + 3) * sizeof *q);
+  memcpy (r->q, given, bytes);
+  memcpy (r->v, given + n, bytes);
   r->predicted = 0;
   pw_run_free_sides (r);
   status = restart_continue (r, &after, error);
@@ -421,7 +403,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
     pw_archive_free (&kept);
     if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK || pw_run_renew (r, NULL) != PW_OK) r->interrupted = 1;
   }
-  memcpy (r->q_given, r->given_before, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
+  memcpy (r->q_given, r->given_before, 2 * (n + 3) * sizeof *r->q);
   r->reselect_below = reselect_below, r->initial = initial;
   if (pw_run_select_rows (r, NULL) == PW_OK && pw_run_evaluate (r, NULL) == PW_OK && r->redundant)
     pw_watchdog_begin (r);
@@ -479,13 +461,6 @@ typedef struct {
 _Static_assert(sizeof (checkpoint_members) == sizeof (pw_statistics),
                "enter each member of pw_statistics in util.h, PW_STATISTICS_..., and a count also in docs/manual.md");
 
-static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
-#define CHECKPOINT_COUNT(name) pw_archive_count (a, &s->name);
-#define CHECKPOINT_RESIDUAL(name) pw_archive_bytes (a, &s->name, sizeof s->name);
-  PW_STATISTICS_COUNTS (CHECKPOINT_COUNT)
-  PW_STATISTICS_RESIDUALS (CHECKPOINT_RESIDUAL)
-}
-
 static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->entries * sizeof (double);
   double *const number[] = {
@@ -500,7 +475,10 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
     if (r->s->source[i].signal.type == PW_HARMONIC)
       pw_archive_bytes (a, &r->w->source[i].signal.harmonic, sizeof (pw_harmonic));
   if (a->loading) r->w->t_signal = NAN;
-  checkpoint_statistics (&r->statistics, a);
+#define CHECKPOINT_COUNT(name) pw_archive_count (a, &r->statistics.name);
+#define CHECKPOINT_RESIDUAL(name) pw_archive_bytes (a, &r->statistics.name, sizeof (double));
+  PW_STATISTICS_COUNTS (CHECKPOINT_COUNT)
+  PW_STATISTICS_RESIDUALS (CHECKPOINT_RESIDUAL)
   pw_rank_serialise (r, a);
   pw_events_serialise (r, a);
   pw_run_serialise_sides (r, a);

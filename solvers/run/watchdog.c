@@ -11,8 +11,6 @@
 #include "rank.h"
 #include "util.h"
 
-/* ---- Thresholds ---- */
-
 /* Residuals are scaled; lengths and motions are in units of L and rad; a relative sine is the sine over the largest one
  * of the run.  s: the sine; d: the residual; eps: the machine precision.  Where branches cross, the constraints are
  * x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d: each branch turns, most sharply where
@@ -130,17 +128,6 @@ double pw_run_acceleration_norm (const pw_run *r) {
   return norm;
 }
 
-/* The largest change of a body's coordinate in the last step, in units of the scene. */
-static double watchdog_step_length (const pw_run *r) {
-  const double *q = r->q, *before = r->watchdog.previous_q;
-  double length = 0, angle = 0;
-  for (int n = r->s->bodies; n > 0; n--, q += 3, before += 3) {
-    length = pw_larger (fabs (q[0] - before[0]), pw_larger (fabs (q[1] - before[1]), length));
-    angle = pw_larger (fabs (q[2] - before[2]), angle);
-  }
-  return pw_larger (length / r->s->scale.length, angle);
-}
-
 /* Change points: configurations at which branches of a motion cross, or nearly do.
  *
  * In suitable coordinates the constraints near one are x y = e; the sine (method.h) is |(x, y)|.  For e = 0 the
@@ -242,7 +229,6 @@ static int change_stride (change_walk *walk, double part) {
   return PW_RETRY;
 }
 
-/* Walks from the beginning of the step to its end. */
 static change_verdict change_follow (change_walk *walk) {
   pw_run *r = walk->r;
   const pw_watchdog *watch = &r->watchdog;
@@ -332,17 +318,6 @@ static int change_fail (pw_run *r, int row, double apart, const char *finding, d
                   r->t, element, finding, apart, length, r->fixed_steps ? "step" : "tolerance");
 }
 
-static int change_report (pw_run *r, const change_walk *walk, change_verdict verdict, double sine, double length,
-                          pw_error *error) {
-  pw_watchdog *watch = &r->watchdog;
-  double low = r->thresholds.unresolved * fmin (watch->previous_sine, sine);
-  watch->may_have_crossed |= verdict == CHANGE_UNKNOWN || walk->least_sine <= r->thresholds.crossing;
-  const char *found = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
-  if (verdict == CHANGE_SAME_BRANCH && !watch->may_have_crossed && walk->least_sine < low)
-    found = "the step does not resolve it";
-  return found ? change_fail (r, walk->least_row, walk->least_sine / walk->sine_slope, found, length, error) : PW_OK;
-}
-
 int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
   change_walk walk;
@@ -356,7 +331,13 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   r->w->failed = failed;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (cause.status != PW_OK) return pw_fail (error, cause.status, "%s", cause.text);
-  return suspect ? change_report (r, &walk, verdict, sine, length, error) : PW_OK;
+  if (!suspect) return PW_OK;
+  double low = r->thresholds.unresolved * fmin (watch->previous_sine, sine);
+  watch->may_have_crossed |= verdict == CHANGE_UNKNOWN || walk.least_sine <= r->thresholds.crossing;
+  const char *found = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
+  if (verdict == CHANGE_SAME_BRANCH && !watch->may_have_crossed && walk.least_sine < low)
+    found = "the step does not resolve it";
+  return found ? change_fail (r, walk.least_row, walk.least_sine / walk.sine_slope, found, length, error) : PW_OK;
 }
 
 /* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
@@ -558,8 +539,6 @@ int pw_dead_point_explain (pw_run *r, pw_error *error) {
   return PW_METHOD;
 }
 
-/* ---- Following the motion ---- */
-
 static void watchdog_record_sine (pw_run *r, double sine) {
   pw_watchdog *watch = &r->watchdog;
   watch->checked_sine = sine;
@@ -608,7 +587,13 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
   int status = PW_OK;
   if (watch->saddle == NULL) return PW_OK;
-  watch->step_length = watchdog_step_length (r);
+  const double *q = r->q, *before = watch->previous_q;
+  double length = 0, angle = 0; /* the largest change of a body's coordinate in the step */
+  for (int n = r->s->bodies; n > 0; n--, q += 3, before += 3) {
+    length = pw_larger (fabs (q[0] - before[0]), pw_larger (fabs (q[1] - before[1]), length));
+    angle = pw_larger (fabs (q[2] - before[2]), angle);
+  }
+  watch->step_length = pw_larger (length / r->s->scale.length, angle);
   watch->moved += watch->step_length;
   double near = r->thresholds.near * watch->largest_sine, ahead = r->thresholds.step_growth * watch->step_length;
   int may_be_near = watchdog_reaches (r, near, ahead);
@@ -630,8 +615,6 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
   return status;
 }
-
-/* ---- Lost constraints ---- */
 
 static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
@@ -666,8 +649,6 @@ static int watchdog_contradicts (pw_run *r) {
       r->thresholds.redundant_residual + r->thresholds.redundant_ratio * fmax (enforced.position, enforced.velocity);
   return watchdog_exceeds (all.position, all.velocity, explained);
 }
-
-/* ---- Jumps ---- */
 
 /* The residual of positions in units of L. */
 static double watchdog_residual (const pw_run *r) {
