@@ -107,6 +107,10 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
 #define EACH_DERIVATIVE(X) X (jw_q) X (gamma_q) X (gamma_v) /* X: a macro that defines the function of one */
 #define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
 
+/* The two bodies of a definition. */
+#define BODIES_FIELD(type) \
+  { PW_AT (type, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" }
+
 /* The only reaction of a type: its name, unit and meaning. */
 #define REACTION(name, unit, about)  \
   .reaction = &(const pw_quantity) { \
@@ -152,13 +156,13 @@ static inline const pw_configuration *batch_body (const pw_batch *batch, int i) 
   return &batch->configuration[batch->body[i]];
 }
 
-/* eta of a velocity constraint equation whose right-hand side is the element's only signal. */
-static inline void batch_eta_of_signal (const pw_batch *batch, double *out) {
+/* The element's only signal: eta of a velocity constraint equation, or the force on a first-order state. */
+static inline void batch_signal (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e];
 }
 
 /* Its derivative with respect to the signal. */
-static inline void batch_eta_u_of_signal (const pw_batch *batch, double *out) {
+static inline void batch_signal_u (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) out[e] = 1;
 }
 

@@ -90,6 +90,20 @@ PER_ELEMENT (contact_place, contact, 3) {
   out[2] = now.body->phi + now.constants.heading;
 }
 
+/* GRIP (wheel, pw_wheel, contact_at (batch, e)) defines the functions of a wheel that may slide: wheel_limits,
+ * wheel_loss, lambda S v; the last argument is the contact_state of element e. */
+#define GRIP(type, definition_type, contact_of_e)                        \
+  static void type##_limits (const void *definition, pw_bounds *limit) { \
+    const definition_type *wheel = definition;                           \
+    limit_both_sides (&wheel->grip, &wheel->grip_sliding, limit);        \
+  }                                                                      \
+  static void type##_loss (const pw_batch *batch, double *out) {         \
+    for (int e = 0; e < batch->count; e++) {                             \
+      const contact_state now = contact_of_e;                            \
+      out[e] = batch->lambda[e] * contact_speed (&now);                  \
+    }                                                                    \
+  }
+
 /* Fields of the definition of a wheel that may slide, after its other signals. */
 #define GRIP_FIELDS(type)                                                                                    \
   { PW_AT (type, grip), PW_SIGNAL, .limit = 1, .unit = "N",                                                  \

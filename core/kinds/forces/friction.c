@@ -31,7 +31,7 @@ COULOMB (friction, 6)
 EXACT_COULOMB (friction, pw_friction)
 
 static const pw_field friction_fields[] = {
-  { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  BODIES_FIELD (pw_friction),
   { PW_AT (pw_friction, viscous), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
     .about = "torque per angular velocity" },
   { PW_AT (pw_friction, speed), PW_NUMBER, .unit = "rad/s", .domain = PW_NONNEGATIVE,

@@ -49,8 +49,7 @@ PER_ELEMENT (torsion_loss, torsion, 1) {
 }
 
 static const pw_field torsion_fields[] = {
-  { PW_AT (pw_rotational_spring, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the two bodies; one may be ground" },
+  BODIES_FIELD (pw_rotational_spring),
   { PW_AT (pw_rotational_spring, stiffness), PW_NUMBER, .unit = "N m/rad", .required = 1, .domain = PW_NONNEGATIVE,
     .about = "torque per angle" },
   { PW_AT (pw_rotational_spring, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,

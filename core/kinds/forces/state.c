@@ -13,14 +13,6 @@ static int state_prepare (const void *definition, const pw_body *const *bodies, 
   return PW_OK;
 }
 
-static void state_force (const pw_batch *batch, double *out) {
-  for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e];
-}
-
-static void state_force_u (const pw_batch *batch, double *out) {
-  for (int e = 0; e < batch->count; e++) out[e] = 1;
-}
-
 static const pw_field state_fields[] = {
   { PW_AT (pw_state, rate), PW_SIGNAL, .required = 1, .about = "time derivative of the state, in its unit per second" },
   { PW_AT (pw_state, start), PW_NUMBER, .about = "initial value, in its unit" },
@@ -43,6 +35,6 @@ const pw_kind pw_kind_state = {
   .first_order = 1,
   .signals = 1,
   .coordinate = state_coordinate,
-  .force = state_force,
-  .force_u = state_force_u,
+  .force = batch_signal,
+  .force_u = batch_signal_u,
 };

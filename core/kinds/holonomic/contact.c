@@ -103,9 +103,8 @@ static int touch_make (const pw_contact *definition, int rubs, touch *element, p
   return PW_OK;
 }
 
-/* ---- A path: what its turns add to the functions of a line ---- */
-
-/* The lines along its tangent and its normal in a state, and multiples of them. */
+/* A path: what its turns add to the functions of a line.  The lines along its tangent and its normal in a state, and
+ * multiples of them. */
 typedef struct {
   const line_state *along, *across;
   double Je[6], Jn[6], ve, vn; /* of e and n: J, J v */
@@ -166,8 +165,6 @@ static inline void bend_gamma_q (const touch_state *now, double *out) {
 
 #define bend_J(now, out) (void)0
 
-/* ---- The gap ---- */
-
 PREPARE (touch_prepare, pw_contact, touch) {
   return touch_make (definition, 0, element, error);
 }
@@ -185,16 +182,17 @@ PER_ELEMENT (touch_g_size, touch, 1) {
     *out += fabs (now.element->origin[0]) + fabs (now.element->origin[1]) + fabs (now.place.x) + fabs (now.place.y);
 }
 
-#define TOUCH_GAP(function, size)                                                                            \
-  PER_ELEMENT (touch_##function, touch, size) {                                                              \
-    now.element->is_disc != 0 ? rod_##function##_one (now.rod, out) : line_##function##_one (now.line, out); \
-    if (now.element->path) bend_##function (&now, out);                                                      \
+/* type: touch, the gap, or rub, friction; disc: of the functions for two discs. */
+#define TOUCH(type, disc, function, size)                                                                       \
+  PER_ELEMENT (type##_##function, type, size) {                                                                 \
+    now.element->is_disc != 0 ? disc##_##function##_one (now.rod, out) : line_##function##_one (now.line, out); \
+    if (now.element->path) bend_##function (&now, out);                                                         \
   }
-TOUCH_GAP (J, 6)
-TOUCH_GAP (gamma, 1)
-TOUCH_GAP (jw_q, 6)
-TOUCH_GAP (gamma_q, 6)
-TOUCH_GAP (gamma_v, 6)
+TOUCH (touch, rod, J, 6)
+TOUCH (touch, rod, gamma, 1)
+TOUCH (touch, rod, jw_q, 6)
+TOUCH (touch, rod, gamma_q, 6)
+TOUCH (touch, rod, gamma_v, 6)
 
 J_GAMMA (touch, 6, 1)
 
@@ -202,8 +200,6 @@ static void touch_limits (const void *definition, pw_bounds *limit) {
   limit->most = 0;
   limit->restitution = ((const pw_contact *)definition)->restitution;
 }
-
-/* ---- Friction ---- */
 
 static int touch_has_friction (const void *definition) {
   return ((const pw_contact *)definition)->mu > 0;
@@ -229,64 +225,47 @@ PER_ELEMENT (rub_J, rub, 6) {
   out[5] += now.element->is_disc != 0 ? now.element->other : -now.element->radius;
 }
 
-PER_ELEMENT (rub_gamma, rub, 1) {
+static inline void discs_gamma_one (rod_state of, double *out) {
   double e[2], c[2];
-  if (now.element->is_disc == 0) {
-    line_gamma_one (now.line, out);
-    if (now.element->path) bend_gamma (&now, out);
-    return;
-  }
-  rub_tangent (&now.rod, e);
-  points_gamma_one (now.rod.ends, c);
-  *out = rod_dot (e, c) / now.rod.L;
+  rub_tangent (&of, e);
+  points_gamma_one (of.ends, c);
+  *out = rod_dot (e, c) / of.L;
 }
 
 /* ((D w) turned^T D + e^T (D w)_q) / L, as rod_jw_q */
-J_GAMMA (rub, 6, 1)
-
-PER_ELEMENT (rub_jw_q, rub, 6) {
-  const points_state *ends = &now.rod.ends;
+static inline void discs_jw_q_one (rod_state of, double *out) {
+  const points_state *ends = &of.ends;
   double e[2], Dw[2] = { 0, 0 };
-  if (now.element->is_disc == 0) {
-    line_jw_q_one (now.line, out);
-    if (now.element->path) bend_jw_q (&now, out);
-    return;
-  }
-  rub_tangent (&now.rod, e);
-  for (int j = 0; j < 6; j++) Dw[0] -= now.rod.D[6 + j] * ends->w[j], Dw[1] += now.rod.D[j] * ends->w[j];
-  rod_multiply_D (&now.rod, Dw, out);
-  out[2] -= rod_dot (e, ends->S1) * ends->w[2] / now.rod.L;
-  out[5] += rod_dot (e, ends->S2) * ends->w[5] / now.rod.L;
+  rub_tangent (&of, e);
+  for (int j = 0; j < 6; j++) Dw[0] -= of.D[6 + j] * ends->w[j], Dw[1] += of.D[j] * ends->w[j];
+  rod_multiply_D (&of, Dw, out);
+  out[2] -= rod_dot (e, ends->S1) * ends->w[2] / of.L;
+  out[5] += rod_dot (e, ends->S2) * ends->w[5] / of.L;
 }
 
 /* (c turned^T D + e^T c_q) / L, as rod_gamma_q */
-PER_ELEMENT (rub_gamma_q, rub, 6) {
-  const rod_state *of = &now.rod;
+static inline void discs_gamma_q_one (rod_state of, double *out) {
   double e[2], c[2];
-  if (now.element->is_disc == 0) {
-    line_gamma_q_one (now.line, out);
-    if (now.element->path) bend_gamma_q (&now, out);
-    return;
-  }
-  rub_tangent (of, e);
-  points_gamma_one (of->ends, c);
-  rod_multiply_D (of, (const double[2]){ -c[1], c[0] }, out);
-  out[2] += of->omega1 * of->omega1 * (e[0] * of->D[2] + e[1] * of->D[8]) / of->L;
-  out[5] += of->omega2 * of->omega2 * (e[0] * of->D[5] + e[1] * of->D[11]) / of->L;
+  rub_tangent (&of, e);
+  points_gamma_one (of.ends, c);
+  rod_multiply_D (&of, (const double[2]){ -c[1], c[0] }, out);
+  out[2] += of.omega1 * of.omega1 * (e[0] * of.D[2] + e[1] * of.D[8]) / of.L;
+  out[5] += of.omega2 * of.omega2 * (e[0] * of.D[5] + e[1] * of.D[11]) / of.L;
 }
 
-PER_ELEMENT (rub_gamma_v, rub, 6) {
+static inline void discs_gamma_v_one (rod_state of, double *out) {
   double e[2];
-  if (now.element->is_disc == 0) {
-    line_gamma_v_one (now.line, out);
-    if (now.element->path) bend_gamma_v (&now, out);
-    return;
-  }
-  rub_tangent (&now.rod, e);
+  rub_tangent (&of, e);
   memset (out, 0, 6 * sizeof *out);
-  out[2] = 2 * now.rod.omega1 * rod_dot (e, now.rod.ends.S1) / now.rod.L;
-  out[5] = -2 * now.rod.omega2 * rod_dot (e, now.rod.ends.S2) / now.rod.L;
+  out[2] = 2 * of.omega1 * rod_dot (e, of.ends.S1) / of.L;
+  out[5] = -2 * of.omega2 * rod_dot (e, of.ends.S2) / of.L;
 }
+
+TOUCH (rub, discs, gamma, 1)
+TOUCH (rub, discs, jw_q, 6)
+TOUCH (rub, discs, gamma_q, 6)
+TOUCH (rub, discs, gamma_v, 6)
+J_GAMMA (rub, 6, 1)
 
 static void rub_loss (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) {

@@ -11,7 +11,7 @@ PREPARE (pin_prepare, pw_pin, points) {
 }
 
 static const pw_field pin_fields[] = {
-  { PW_AT (pw_pin, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  BODIES_FIELD (pw_pin),
   { PW_AT (pw_pin, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the common point in each body's frame" },
   { .name = NULL },

@@ -13,28 +13,28 @@ PREPARE (rope_prepare, pw_rope, rod) {
   return PW_OK;
 }
 
+/* Fields of both definitions; about: the length. */
+#define ROD_FIELDS(type, what)                                                                               \
+  BODIES_FIELD (type), { PW_AT (type, at), PW_POINT,      .count = 2,                                        \
+                         .unit = "m",      .required = 1, .about = "the end points in the bodies' frames" }, \
+  {                                                                                                          \
+    PW_AT (type, length), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE, .about = what        \
+  }
+
 static void rope_limits (const void *definition, pw_bounds *limit) {
   limit->least = 0;
   limit->restitution = ((const pw_rope *)definition)->restitution;
 }
 
 static const pw_field rope_fields[] = {
-  { PW_AT (pw_rope, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
-  { PW_AT (pw_rope, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the end points in the bodies' frames" },
-  { PW_AT (pw_rope, length), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
-    .about = "largest distance between the end points" },
+  ROD_FIELDS (pw_rope, "largest distance between the end points"),
   { PW_AT (pw_rope, restitution), PW_NUMBER, .domain = PW_FRACTION,
     .about = "velocity after the rope has become taut over that before it" },
   { .name = NULL },
 };
 
 static const pw_field rod_fields[] = {
-  { PW_AT (pw_rod, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
-  { PW_AT (pw_rod, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the end points in the bodies' frames" },
-  { PW_AT (pw_rod, length), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
-    .about = "distance between the end points" },
+  ROD_FIELDS (pw_rod, "distance between the end points"),
   { .name = NULL },
 };
 

@@ -61,7 +61,7 @@ J_GAMMA (weld, 18, 3)
 EACH_DERIVATIVE (WELD_DERIVATIVE)
 
 static const pw_field weld_fields[] = {
-  { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  BODIES_FIELD (pw_weld),
   { PW_AT (pw_weld, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the common point in each body's frame" },
   { PW_AT (pw_weld, angle), PW_NUMBER, .unit = "rad",

@@ -69,7 +69,7 @@ PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
 }
 
 static const pw_field pfaffian_fields[] = {
-  { PW_AT (pw_pfaffian, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  BODIES_FIELD (pw_pfaffian),
   { PW_AT (pw_pfaffian, a), PW_NUMBER, .count = 3, .required = 1,
     .about = "coefficients of vx, vy and omega of the first body, in its frame" },
   { PW_AT (pw_pfaffian, b), PW_NUMBER, .count = 3,
@@ -94,7 +94,7 @@ const pw_kind pw_kind_pfaffian = {
   .level = PW_NONHOLONOMIC,
   REACTION ("F", "N or N m", "F a and F b are force and moment on the two bodies, in the frame of the first"),
   .reaction_unit = pfaffian_unit,
-  .eta = batch_eta_of_signal,
-  .eta_u = batch_eta_u_of_signal,
+  .eta = batch_signal,
+  .eta_u = batch_signal_u,
   CONSTRAINT (pfaffian),
 };

@@ -34,17 +34,7 @@ PREPARE (steered_prepare, pw_steered_wheel, steered) {
   return limit_check ("grip", &definition->grip, &definition->grip_sliding, error);
 }
 
-static void steered_limits (const void *definition, pw_bounds *limit) {
-  const pw_steered_wheel *wheel = definition;
-  limit_both_sides (&wheel->grip, &wheel->grip_sliding, limit);
-}
-
-static void steered_loss (const pw_batch *batch, double *out) {
-  for (int e = 0; e < batch->count; e++) {
-    steered_state now = steered_at (batch, e);
-    out[e] = batch->lambda[e] * contact_speed (&now.contact);
-  }
-}
+GRIP (steered, pw_steered_wheel, steered_at (batch, e).contact)
 
 PER_ELEMENT (steered_J, steered, 3) {
   contact_J_one (now.contact, out);

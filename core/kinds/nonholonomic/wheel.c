@@ -13,17 +13,7 @@ PREPARE (wheel_prepare, pw_wheel, contact) {
   return limit_check ("grip", &definition->grip, &definition->grip_sliding, error);
 }
 
-static void wheel_limits (const void *definition, pw_bounds *limit) {
-  const pw_wheel *wheel = definition;
-  limit_both_sides (&wheel->grip, &wheel->grip_sliding, limit);
-}
-
-static void wheel_loss (const pw_batch *batch, double *out) {
-  for (int e = 0; e < batch->count; e++) {
-    contact_state now = contact_at (batch, e);
-    out[e] = batch->lambda[e] * contact_speed (&now);
-  }
-}
+GRIP (wheel, pw_wheel, contact_at (batch, e))
 
 static const pw_field wheel_fields[] = {
   { PW_AT (pw_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
