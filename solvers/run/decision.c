@@ -4,13 +4,19 @@
 #include <string.h>
 #include "decision.h"
 
-#define DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
-#define DECISION_NEAR 0.5        /* [limit] of a circle: a multiplier that is larger is near its limit */
+#define DECISION_NEAR 0.5       /* [limit] of a circle: a multiplier that is larger is near its limit */
+#define DECISION_ROUND_OFF 1e-9 /* of z, in the units of decision_size */
 enum {
   DECISION_MOST = 5000,    /* combinations of modes that are tried, at about a microsecond each */
   DECISION_PASSES = 10000, /* most projected gradients */
   DECISION_LATE = 500      /* of these, after which circles no longer alternate */
 };
+
+/* Makes z and x of an equation comparable. */
+static double decision_unit (const pw_decision *d, int k) {
+  const double A = d->A[k * d->n + k];
+  return A > 0 ? sqrt (A) : 1;
+}
 
 int pw_decision_apart (const pw_decision *d, int k) {
   return d->normal[k] >= 0 && d->trial[d->normal[k]] != 0;
@@ -92,7 +98,7 @@ double pw_decision_z (const pw_decision *d, int k) {
 /* By how much equation k violates its conditions, in the units of decision_size; *to: the mode that would satisfy them.
  * size: decision_size, of which round-off is no violation. */
 static double decision_violation (const pw_decision *d, int k, double size, int *to) {
-  const double unit = sqrt (d->A[k * d->n + k]), scale = d->normal[k] < 0 ? 1 : fabs (d->x[d->normal[k]]);
+  const double unit = decision_unit (d, k), scale = d->normal[k] < 0 ? 1 : fabs (d->x[d->normal[k]]);
   const double hi = d->normal[k] < 0 ? d->hi[k] : d->hi[k] * scale, lo = d->normal[k] < 0 ? d->lo[k] : d->lo[k] * scale;
   *to = d->x[k] > hi ? 1 : -1;
   if (d->limit[d->list[k]].circle) return 0; /* decision_step_on_circle */
@@ -102,7 +108,7 @@ static double decision_violation (const pw_decision *d, int k, double size, int 
   if (d->redundant[k]) {
     const double z = pw_decision_z (d, k) / unit;
     *to = isinf (lo) || (!isinf (hi) && z > 0) ? 1 : -1;
-    return 1e6 * (*to * z - 1e-9 * size);
+    return 1e6 * (*to * z - DECISION_ROUND_OFF * size);
   }
   if (d->trial[k] == 0) return unit * fmax (d->x[k] - hi, lo - d->x[k]);
   *to = 0;
@@ -120,10 +126,20 @@ static void decision_set_given (pw_decision *d) {
 static double decision_size (const pw_decision *d) {
   double size = 0;
   for (int k = 0; k < d->n; k++) {
-    const double unit = sqrt (d->A[k * d->n + k]);
+    const double unit = decision_unit (d, k);
     size = fmax (size, fmax (fabs (d->b[k]) / unit, fabs (d->x[k]) * unit));
   }
   return size;
+}
+
+int pw_decision_rests (const pw_decision *d, int k) {
+  return fabs (pw_decision_z (d, k)) <= DECISION_ROUND_OFF * decision_size (d) * decision_unit (d, k);
+}
+
+int pw_decision_contradicts (const pw_decision *d) {
+  for (int k = 0; k < d->n; k++)
+    if (d->trial[k] == 0 && d->A[k * d->n + k] == 0 && !pw_decision_apart (d, k) && !pw_decision_rests (d, k)) return 1;
+  return 0;
 }
 
 int pw_decision_pivot (pw_decision *d, int skips) {
@@ -156,12 +172,13 @@ int pw_decision_pivot (pw_decision *d, int skips) {
  * If y is within the limit, both hold from now on, unless it is `late` and y is near the limit.  Otherwise x has the
  * direction of y and the length of the limit.  Returns the change of the direction, or 2 if the mode changes. */
 static double decision_step_on_circle (pw_decision *d, int k, int late) {
+  const double trace = d->A[k * d->n + k] + d->A[(k + 1) * d->n + k + 1];
   double y[2], change = 0;
   for (int m = 0; m < 2; m++) {
     const double *row = d->A + (k + m) * d->n;
     double z = d->b[k + m];
     for (int i = 0; i < d->n; i++) z -= row[i] * d->x[i];
-    y[m] = d->x[k + m] + (d->trial[k] ? z / (d->A[k * d->n + k] + d->A[(k + 1) * d->n + k + 1]) : 0);
+    y[m] = d->x[k + m] + (d->trial[k] && trace > 0 ? z / trace : 0);
   }
   const double size = hypot (y[0], y[1]), most = d->hi[k] * (1 + (d->trial[k] ? -1 : 1) * 1e-13);
   if (size <= most && (d->trial[k] == 0 || size == 0)) return 0;
@@ -203,7 +220,7 @@ static int decision_enumerate (pw_decision *d, int found, int *count) {
   if (combinations > DECISION_MOST) return found ? PW_OK : PW_RETRY;
   *count = found;
   double size = 0; /* of z without x */
-  for (int k = 0; k < n; k++) size = fmax (size, fabs (d->b[k]) / sqrt (d->A[k * n + k]));
+  for (int k = 0; k < n; k++) size = fmax (size, fabs (d->b[k]) / decision_unit (d, k));
   for (int k = 0; k < n && found; k++) kept_modes[k] = d->trial[k], kept_z[k] = pw_decision_z (d, k);
   for (int k = 0; k < n; k++) d->trial[k] = decision_stays (d, k) ? d->trial[k] : 0;
   do {
@@ -211,9 +228,9 @@ static int decision_enumerate (pw_decision *d, int found, int *count) {
     decision_set_given (d);
     (void)pw_decision_solve (d, 1);
     good = decision_size (d) < 1e6 * size; /* else the equations that hold nearly depend on each other */
-    for (int k = 0; k < n; k++) good &= decision_violation (d, k, size, &to) <= 1e-9 * size;
+    for (int k = 0; k < n; k++) good &= decision_violation (d, k, size, &to) <= DECISION_ROUND_OFF * size;
     for (int k = 0; *count > 0 && k < n; k++)
-      same &= fabs (pw_decision_z (d, k) - kept_z[k]) <= 1e-6 * size * sqrt (d->A[k * n + k]);
+      same &= fabs (pw_decision_z (d, k) - kept_z[k]) <= 1e-6 * size * decision_unit (d, k);
     if (!good || (*count > 0 && same)) continue;
     if (++*count > 1) return PW_RETRY;
     for (int k = 0; k < n; k++) kept_modes[k] = d->trial[k], kept_z[k] = pw_decision_z (d, k);

@@ -4,8 +4,11 @@
 #include <math.h>
 #include "pinwheel.h"
 
+#define DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
+
 /* n equations; arrays of that length, unless said otherwise.  z = b - A x are their accelerations or, in impacts,
- * velocities; x are their multipliers or impulses, less the known part of these if there is one. */
+ * velocities; x are their multipliers or impulses, less the known part of these if there is one.  An equation that
+ * depends on constraints outside of the problem has z = b: its row and column of A are 0. */
 typedef struct {
   int n, *list; /* the equations, by their number in `limit` */
   const pw_bounds *limit;
@@ -40,6 +43,12 @@ int pw_decision_solve (pw_decision *d, int skips);
 
 /* z of equation k at the present x. */
 double pw_decision_z (const pw_decision *d, int k);
+
+/* 1 if z of equation k is 0, to round-off, at the present x. */
+int pw_decision_rests (const pw_decision *d, int k);
+
+/* 1 if an equation holds though constraints outside of the problem give it a z that is not 0. */
+int pw_decision_contradicts (const pw_decision *d);
 
 /* 1 if equation k depends on those whose trial mode is 0.  Destroys x. */
 int pw_decision_depends (pw_decision *d, int k);

@@ -205,17 +205,24 @@ void pw_modes_apply (pw_run *r) {
 void pw_modes_matrix (pw_run *r, pw_saddle *saddle) {
   pw_events *x = r->events;
   const pw_system *s = r->s;
-  double *Ja = x->lambda + s->rows;
-  for (int k = 0; k < x->d.n; k++) {
+  const int n = x->d.n;
+  double *Ja = x->lambda + s->rows, *A = x->d.A;
+  for (int k = 0; k < n; k++) {
+    double alone = 0; /* A_kk without constraints */
     memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
     memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
     x->gamma[x->row[x->d.list[k]]] = 1;
     pw_add_JT (r->w, x->gamma, x->f);
+    for (int j = 0; j < s->coords; j++)
+      if (s->mass[j] > 0) alone += x->f[j] * x->f[j] / s->mass[j];
     memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
     pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
     pw_mul_J (r->w, x->a, Ja);
-    for (int i = 0; i < x->d.n; i++) x->d.A[i * x->d.n + k] = Ja[x->row[x->d.list[i]]];
+    for (int i = 0; i < n; i++) A[i * n + k] = Ja[x->row[x->d.list[i]]];
+    x->d.redundant[k] = !(A[k * n + k] > DECISION_DEPENDENT * alone);
   }
+  for (int k = 0; k < n; k++)
+    for (int i = 0; i < n && x->d.redundant[k]; i++) A[i * n + k] = A[k * n + i] = 0;
 }
 
 pw_saddle *pw_modes_open_decision (pw_run *r, int impact, pw_error *error) {
@@ -375,7 +382,7 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   if (!*any) return PW_OK;
   pw_saddle *saddle = pw_modes_open_decision (r, 1, error);
   int count = -1;
-  if (saddle == NULL || impact_solve (x, &count) != PW_OK) {
+  if (saddle == NULL || impact_solve (x, &count) != PW_OK || pw_decision_contradicts (&x->d)) {
     const int status = pw_modes_fail (r, saddle, count, error);
     pw_saddle_close (saddle);
     return status;
@@ -451,10 +458,12 @@ static int decide_modes (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   pw_saddle *saddle = x->d.n > 0 ? pw_modes_open_decision (r, 0, error) : NULL;
   int count = -1, status = saddle ? pw_modes_decide_sliding (x, 1, NULL, &count) : PW_OK;
-  if (x->d.n > 0 && (saddle == NULL || status != PW_OK)) status = pw_modes_fail (r, saddle, count, error);
+  if (x->d.n > 0 && (saddle == NULL || status != PW_OK || pw_decision_contradicts (&x->d)))
+    status = pw_modes_fail (r, saddle, count, error);
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     const int i = x->d.list[k], apart = pw_decision_apart (&x->d, k);
     x->mode[i] = apart ? 1 : x->d.trial[k];
+    x->still[i] = (unsigned char)pw_decision_rests (&x->d, k);
     x->spare[i] = x->d.redundant[k] && !apart;
     x->direction[i] = x->d.towards[k];
     if (x->limit[i].circle == 1) circle_set_bias (r, i, 0);
@@ -462,7 +471,7 @@ static int decide_modes (pw_run *r, pw_error *error) {
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     const int i = x->d.list[k], circle = x->limit[i].circle;
     const int could = x->d.trial[k] && (circle == 1 || !(circle || x->d.fixed[k]));
-    x->still[i] = could && !pw_is_one_sided (&x->limit[i]) && pw_decision_depends (&x->d, k);
+    x->still[i] &= could && !pw_is_one_sided (&x->limit[i]) && pw_decision_depends (&x->d, k);
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     x->d.normal[k] = -1, x->d.trial[k] = (signed char)x->d.fixed[k];

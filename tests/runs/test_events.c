@@ -43,7 +43,7 @@ static int events_read (void) {
       assert_int_equal (sscanf (line, "loss %lf", &p->loss), 1);
   }
   fclose (f);
-  assert_int_equal (events_count, 35);
+  assert_int_equal (events_count, 36);
   return 0;
 }
 
@@ -695,6 +695,33 @@ TEST (wheels_of_a_car) {
       pw_run_close (r);
     }
     pw_system_free (s);
+  }
+}
+
+SCENE (events_driven) {
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1, .rate = { 1 } });
+  pw_add_slider (m, &(pw_slider){ .name = "rail", .body = { "cart", "ground" } });
+  pw_add_drive (m, &(pw_drive){ .name = "D",
+                                .body = { "cart", "ground" },
+                                .what = PW_DRIVE_X,
+                                .value = { PW_HARMONIC, .harmonic = { 1, 1, -PW_PI / 2 } } });
+  pw_add_end_stop (m, &(pw_end_stop){ .name = "S", .body = { "cart", "ground" }, .what = PW_DRIVE_X, .high = 0.5 });
+}
+
+/* A drive runs into a stop: no motion is possible. */
+TEST (driven_into_a_stop) {
+  char method[40];
+  for (int i = 0; runs_method (i, method); i++) {
+    if (runs_method (i, method)->locates_no_events) continue;
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&events_driven_table, NULL);
+    pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 1 });
+    while (pw_run_time (r) < 1 && pw_run_advance (r, 1, &error) == PW_OK) continue;
+    check_error (
+        &error, PW_METHOD,
+        "t = 0.523599 s: whether stop S holds cannot be decided: their equations depend on each other or on other "
+        "constraints");
+    runs_close (r, s);
   }
 }
 
