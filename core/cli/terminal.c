@@ -59,20 +59,16 @@ void pw_cli_print_wrapped (const char *text, int indent, int width) {
   puts (text);
 }
 
-/* 1 if a write to standard output has failed since it is a pipe that the reader has closed: `pinwheel ... | head`. */
-static int say_pipe_closed (void) {
-  struct pollfd out = { .fd = STDOUT_FILENO, .events = POLLOUT };
-  return ferror (stdout) && poll (&out, 1, 0) == 1 && out.revents & POLLERR;
-}
-
 const char *pw_cli_status_word (int status) {
   static const char *const word[] = { "ok", "machine", "input", "start", "method" };
   return status == PW_INTERRUPTED ? "interrupted" : word[-status];
 }
 
 int pw_cli_report_error (const pw_error *error) {
-  if (error->status >= PW_OK) return 0; /* also PW_RETRY, after a request to stop */
-  if (error->status == PW_RESOURCE && say_pipe_closed ()) return PW_CLOSED_PIPE;
+  if (error->status >= PW_OK) return 0;                           /* also PW_RETRY, after a request to stop */
+  struct pollfd out = { .fd = STDOUT_FILENO, .events = POLLOUT }; /* a closed pipe: `pinwheel ... | head` */
+  if (error->status == PW_RESOURCE && ferror (stdout) && poll (&out, 1, 0) == 1 && out.revents & POLLERR)
+    return PW_CLOSED_PIPE;
   fflush (stdout);
   int has_location = strstr (error->text, ": error: ") != NULL; /* the format of compilers, which editors recognise */
   pw_cli_say ("%s%s\n", has_location ? "" : "pinwheel: ", error->text);

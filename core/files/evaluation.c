@@ -265,10 +265,6 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
  * ceil, round, min, max or mod.  With its side fixed (the truth of the comparison, the sign of the operand of abs, the
  * value of floor, the smaller operand, the quotient), the expression is smooth and has a value on both sides. */
 
-static int side_is_condition (int op) {
-  return (op >= PW_OP_ABS && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_MAX);
-}
-
 static double side_natural (const pw_expression_code *c, double a, double b) {
   if (c->op == PW_OP_ABS) return a < 0 ? -1 : 1;
   if (c->op == PW_OP_MIN) return isnan (a) || b < a;
@@ -342,7 +338,8 @@ int pw_expression_sides (const pw_expression *x, const double *variable, double 
   int conditions = 0, n = 0;
   pw_expression_code *code = fixed ? fixed->code : NULL;
   for (const pw_expression_code *c = x->code, *end = c + x->codes; c < end; c++) {
-    const int operands = pw_expression_operands (c->op);
+    const int operands = pw_expression_operands (c->op),
+              conditional = (c->op >= PW_OP_ABS && c->op <= PW_OP_ROUND) || (c->op >= PW_OP_LESS && c->op <= PW_OP_MAX);
     side_number *a = top -= operands, *b = a + (operands > 1), result = { .first = n, .condition = conditions };
     if (operands) result = *a;
     for (int i = 1; i < operands; i++) result.of_states |= a[i].of_states, result.size += a[i].size;
@@ -351,7 +348,7 @@ int pw_expression_sides (const pw_expression *x, const double *variable, double 
       result.size = fabs (result.value);
       result.of_states = c->op == PW_OP_VARIABLE && c->index != PW_EXPRESSION_TIME;
       if (code) code[n++] = *c;
-    } else if (side_is_condition (c->op) && result.of_states) {
+    } else if (conditional && result.of_states) {
       double *s = &side[conditions];
       if (beyond == NULL) *s = side_natural (c, a->value, b->value);
       if (beyond) beyond[conditions] = side_beyond (c->op, *s, a->value, b->value) - SIDE_ROUND_OFF * result.size;

@@ -291,15 +291,6 @@ static void build_defer (sigset_t *mask) {
   pthread_sigmask (SIG_BLOCK, &stop, mask);
 }
 
-/* Compresses an object; without gzip it stays as it is. */
-static void build_pack (const build_command *cmd, const char *source, char *object) {
-  char packed[PW_PATH];
-  pw_error none = { 0 };
-  if (build_run (cmd, (char *[]){ "gzip", "-9n", object, NULL }, source, pw_path (packed, "%s.gz", object), &none) ==
-      PW_OK)
-    rename (packed, object);
-}
-
 /* What is done with the compiled object at a path; it is deleted afterwards. */
 typedef int build_user (void *context, const char *object, pw_error *error);
 
@@ -325,7 +316,11 @@ static int build_file (const char *path, const char *engine, build_user *use, vo
   int status = temporary_folder (folder, error);
   if (status == PW_OK) {
     status = build_object (&cmd, path, pw_path (object, "%s/object", folder), error);
-    if (status == PW_OK && engine) build_pack (&cmd, path, object);
+    if (status == PW_OK && engine) { /* without gzip the object stays as it is */
+      char packed[PW_PATH], *const gzip[] = { "gzip", "-9n", object, NULL };
+      if (build_run (&cmd, gzip, path, pw_path (packed, "%s.gz", object), &(pw_error){ 0 }) == PW_OK)
+        rename (packed, object);
+    }
     if (status == PW_OK) status = use (context, object, error);
     unlink (object);
     rmdir (folder);
@@ -731,12 +726,6 @@ static long long cache_size (const char *folder, char oldest[PW_PATH]) {
   return size;
 }
 
-/* Deletes the least recently used files until the rest is within the limit; each use must set st_mtime. */
-static void cache_trim (const char *folder) {
-  char oldest[PW_PATH];
-  while (cache_size (folder, oldest) > CACHE_MAX_BYTES && (unlink (oldest) == 0 || errno == ENOENT)) continue;
-}
-
 /* ---- Code of scenes ----
  *
  * A file KEY.so in the cache is the object, then its source and a checksum; it is loaded if these are as expected.
@@ -925,7 +914,11 @@ static int code_open (code_job *x, pw_error *error) {
     code_paths (x);
     if (code_load_cached (x) == PW_OK) return PW_OK;
     int status = code_make (x, &cause);
-    if (status == PW_OK) return cache_trim (x->folder), PW_OK;
+    if (status == PW_OK) { /* the least recently used files are deleted; each use sets st_mtime */
+      char oldest[PW_PATH];
+      while (cache_size (x->folder, oldest) > CACHE_MAX_BYTES && (unlink (oldest) == 0 || errno == ENOENT)) continue;
+      return PW_OK;
+    }
     if (status == PW_STOPPED || (status == PW_METHOD && access (x->c_file, F_OK) == 0))
       return pw_fail (error, status, "%s", cause.text);
   }

@@ -53,14 +53,6 @@ static uint64_t number_product (const uint64_t *power, uint64_t x) {
   return (uint64_t)(high >> 64) | ((uint64_t)high > 1);
 }
 
-/* floor (log10 (2^q)), or with 3/4 2^q in place of 2^q; floor (log2 (10^k)).  Exact for exponents of doubles. */
-static int number_log10 (int q, int three_quarters) {
-  return (q * 1262611 - (three_quarters ? 524031 : 0)) >> 22;
-}
-static int number_log2 (int k) {
-  return (k * 1741647) >> 19;
-}
-
 /* The shortest decimal m 10^*e that is nearer to `value`, positive and finite, than to any other double; of several the
  * nearest one.  Returns m, which may end with zeros. */
 static uint64_t number_decimal (double value, int *e) {
@@ -72,8 +64,8 @@ static uint64_t number_decimal (double value, int *e) {
   const uint64_t c = exponent ? fraction | 1ULL << 52 : fraction, odd = c & 1;
   *e = 0;
   if (q <= 0 && q > -53 && (c & ((1ULL << -q) - 1)) == 0) return c >> -q; /* an integer */
-  *e = number_log10 (q, closer_below);
-  const int shift = q + number_log2 (-*e) + 1;
+  *e = (q * 1262611 - (closer_below ? 524031 : 0)) >> 22; /* floor (log10 (2^q)), or of 3/4 2^q: exact for doubles */
+  const int shift = q + ((-*e * 1741647) >> 19) + 1;      /* floor (log2 (10^-*e)), likewise */
   const uint64_t *power = number_power (-*e);
   /* four times the value and the ends of the interval that rounds to it, in units of 10^*e; odd: without its ends */
   const uint64_t middle = number_product (power, 4 * c << shift);

@@ -436,17 +436,14 @@ static parser_part parser_group (parser *p) {
   return part;
 }
 
-static parser_part parser_number (parser *p) {
-  char digits[PARSER_MAX_LENGTH + 1];
-  double value = 0;
-  snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
-  if (pw_read_number (digits, &value) != PW_OK) p->status = PW_RESOURCE;
-  return parser_leaf (p, PW_OP_CONSTANT, 0, value);
-}
-
 static parser_part parser_operand (parser *p) {
   if (p->status != PW_OK) return (parser_part){ 0 };
-  if (p->type == '0') return parser_number (p);
+  if (p->type == '0') {
+    double value = 0;
+    if (pw_read_number (PW_PRINTED (PARSER_MAX_LENGTH + 1, "%.*s", (int)p->size, p->text + p->at), &value) != PW_OK)
+      p->status = PW_RESOURCE;
+    return parser_leaf (p, PW_OP_CONSTANT, 0, value);
+  }
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
   const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);

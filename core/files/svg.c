@@ -119,12 +119,6 @@ static const char *svg_attribute (const char *tag, const char *name) {
   return NULL;
 }
 
-/* Whether a transformation, after its quote, is a translation alone. */
-static int svg_translates (const char *text) {
-  const size_t n = strcspn (text, ")");
-  return strncmp (text, "translate", 9) == 0 && text[n] == ')' && text[n + 1] == text[-1];
-}
-
 const char *pw_svg_outline (const char *text, pw_corners *points, int *status) {
   svg s = { .points = points };
   *status = PW_OK;
@@ -133,7 +127,9 @@ const char *pw_svg_outline (const char *text, pw_corners *points, int *status) {
     if (end && strstr (tag, end)) tag = strstr (tag, end);
     if (end) continue;
     const char *transform = svg_attribute (tag, "transform"), *polygon;
-    if (transform && !svg_translates (transform))
+    const size_t n = transform ? strcspn (transform, ")") : 0;
+    if (transform &&
+        (strncmp (transform, "translate", 9) != 0 || transform[n] != ')' || transform[n + 1] != transform[-1]))
       return "it has transformations: apply them in the program that has drawn it";
     if (strncmp (tag, "<path", 5) == 0 && (s.at = svg_attribute (tag, "d")) != NULL) return svg_path (&s, status);
     if ((strncmp (tag, "<polygon", 8) != 0 && strncmp (tag, "<polyline", 9) != 0) ||

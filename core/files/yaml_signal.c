@@ -309,11 +309,6 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal
   return PW_OK;
 }
 
-static int signal_conditions (const pw_expression *x) {
-  double variable[PW_OUTPUT_READS + 1] = { 0 }, side[PW_EXPRESSION_CODES];
-  return pw_expression_sides (x, variable, side, NULL, NULL);
-}
-
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
 static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal *signal) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
@@ -338,7 +333,8 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
     if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
   }
   if (f->states) signal->function.reads = f->name + 1;
-  if (f->states) f->conditions = signal_conditions (f->expression[0]);
+  double variable[PW_OUTPUT_READS + 1] = { 0 }, side[PW_EXPRESSION_CODES];
+  if (f->states) f->conditions = pw_expression_sides (f->expression[0], variable, side, NULL, NULL);
   if (f->conditions) signal->function.sides = signal_sides;
   return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
 }

@@ -215,12 +215,6 @@ static int data_is_along (const pw_fit *fit, int j) {
   return j > 0 && j <= fit->columns && fit->column_kind[j - 1] == FIT_ALONG;
 }
 
-static int data_row_is_along (const pw_fit *fit, const double *table, int i) {
-  int found = 0;
-  for (int j = 1; j <= fit->columns; j++) found |= data_is_along (fit, j) && !isnan (table[j * fit->rows + i]);
-  return found;
-}
-
 /* Copies the rows of the table that have a time, up to --t-end; after them, if there are outputs, the others without
  * time and data along the run. */
 static int data_keep_rows (pw_fit *fit, const double *table, int columns, pw_error *error) {
@@ -230,9 +224,11 @@ static int data_keep_rows (pw_fit *fit, const double *table, int columns, pw_err
   fit->table = pw_arena_alloc (&fit->line.arena, (size_t)columns * (size_t)rows * sizeof *table);
   if (fit->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < rows; i++) {
+    int is_along = 0; /* 1: the row has a datum along the run */
+    for (int j = 1; j <= fit->columns; j++) is_along |= data_is_along (fit, j) && !isnan (table[j * rows + i]);
     if (table[i] <= t_end)
       fit->timed++;
-    else if (!outputs || data_row_is_along (fit, table, i))
+    else if (!outputs || is_along)
       ++*(isnan (table[i]) ? &fit->untimed : &fit->late);
     if (isnan (table[i])) continue;
     if (with_time++ == 0) fit->first = table[i];

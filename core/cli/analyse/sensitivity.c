@@ -217,9 +217,19 @@ static void sensitivity_print_row (const sensitivity *cmd, pw_table *table, int 
   pw_row_end (table);
 }
 
+/* 1 if the derivative is not known; or if its error exceeds 1 % of it and matters: the error times the size of the
+ * unknown exceeds 1 % of the output, and 1e-6 in SI units. */
+static int sensitivity_is_uncertain (const sensitivity *cmd, int output, int unknown) {
+  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
+  if (d->type != PW_DERIVATIVE) return d->type == PW_UNKNOWN;
+  return d->error > 0.01 * fabs (d->value) &&
+         d->error * cmd->unknowns.list[unknown].size > fmax (0.01 * fabs (cmd->value[output]), 1e-6);
+}
+
 static void sensitivity_print (const sensitivity *cmd) {
   const pw_unknowns *u = &cmd->unknowns;
-  char unit[SENSITIVITY_UNIT], reason[500];
+  char unit[SENSITIVITY_UNIT], reason[500], list[1000] = "";
+  size_t used = 0;
   printf ("%s by %s to t = %.9g s\n", pw_file_name (cmd->line.m.file), u->method, u->settings.span);
   for (int o = 0; o < cmd->outputs.count; o++) {
     pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit);
@@ -238,25 +248,11 @@ static void sensitivity_print (const sensitivity *cmd) {
         pw_cli_print (stdout, "  %s\n", sensitivity_reason (&u->list[p], d, reason, sizeof reason));
     }
   }
-}
-
-/* 1 if the derivative is not known; or if its error exceeds 1 % of it and matters: the error times the size of the
- * unknown exceeds 1 % of the output, and 1e-6 in SI units. */
-static int sensitivity_is_uncertain (const sensitivity *cmd, int output, int unknown) {
-  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
-  if (d->type != PW_DERIVATIVE) return d->type == PW_UNKNOWN;
-  return d->error > 0.01 * fabs (d->value) &&
-         d->error * cmd->unknowns.list[unknown].size > fmax (0.01 * fabs (cmd->value[output]), 1e-6);
-}
-
-static void sensitivity_warn (const sensitivity *cmd) {
-  char list[1000] = "";
-  size_t used = 0;
   for (int o = 0; o < cmd->outputs.count; o++)
-    for (int p = 0; p < cmd->unknowns.count && used < sizeof list; p++)
+    for (int p = 0; p < u->count && used < sizeof list; p++)
       if (sensitivity_is_uncertain (cmd, o, p))
         used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", cmd->outputs.of[o],
-                                  cmd->unknowns.list[p].name);
+                                  u->list[p].name);
   if (used) pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
 }
 
@@ -402,7 +398,7 @@ static int sensitivity_command (void *options, pw_error *error) {
     pw_stop_release ();
     cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   }
-  if (status == PW_OK) sensitivity_print (cmd), sensitivity_warn (cmd);
+  if (status == PW_OK) sensitivity_print (cmd);
   if (status == PW_OK) status = pw_results_write (&cmd->line, 5, cmd, sensitivity_csv, sensitivity_json, error);
   if (status == PW_OK && cmd->line.plots && cmd->outputs.rows > 1) status = sensitivity_draw (cmd, error);
   pw_outcomes_close (&cmd->outcomes);

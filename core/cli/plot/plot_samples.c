@@ -168,19 +168,17 @@ void pw_plots_last (pw_plots *plots, const pw_sample *sample) {
   plots->planned = plots->samples;
 }
 
-/* The constraint equation `row` or, of a companion, one of the element that it accompanies. */
-static int plot_row_of (const pw_plots *plots, int row) {
-  const pw_element_info own = pw_system_element (plots->system, pw_system_row_element (plots->system, row));
-  const pw_plot_link *link = pw_plot_accompanied (plots, &own);
-  return link ? pw_system_element (plots->system, link->element).row : row;
-}
-
 void pw_plots_events (pw_plots *plots, const pw_run *run) {
   const pw_event *event = pw_run_events (run, &plots->events);
   plots->event = pw_arena_alloc (&plots->arena, (size_t)plots->events * sizeof *plots->event);
   if (plots->event == NULL) plots->events = 0;
-  for (int i = 0; i < plots->events; i++)
-    plots->event[i] = event[i], plots->event[i].row = plot_row_of (plots, event[i].row);
+  for (int i = 0; i < plots->events; i++) { /* those of a companion: of the element that it accompanies */
+    const int row = event[i].row;
+    const pw_element_info own = pw_system_element (plots->system, pw_system_row_element (plots->system, row));
+    const pw_plot_link *link = pw_plot_accompanied (plots, &own);
+    plots->event[i] = event[i];
+    plots->event[i].row = link ? pw_system_element (plots->system, link->element).row : row;
+  }
 }
 
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
@@ -242,16 +240,6 @@ static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error
       fprintf (out, "%d\n", pw_plot_pick (k, tracks->drawn, tracks->count) + 1);
     }
   }
-  return pw_output_finish (o, error);
-}
-
-/* A file of `rows` rows of `width` numbers, of which the first `count` are written; no file without rows. */
-static int data_table (const pw_plots *plots, const char *name, const char *heading, const double *row, int width,
-                       int count, int rows, pw_error *error) {
-  pw_output *o = rows ? pw_figure_open_data (&plots->figures, name, error) : NULL;
-  if (o == NULL) return rows ? PW_RESOURCE : PW_OK;
-  fprintf (pw_output_stream (o), "# %s\n", heading);
-  for (int i = 0; i < rows; i++, row += width) data_row (pw_output_stream (o), row, count, "\n");
   return pw_output_finish (o, error);
 }
 
@@ -388,13 +376,16 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
   return pw_output_finish (o, error);
 }
 
-static int data_paths (const pw_plots *plots, pw_error *error) {
-  pw_output *o = pw_figure_open_data (&plots->figures, "model-paths.dat", error);
+/* Points of the ground, or of the paths of the model, with blank lines between these. */
+static int data_points (const pw_plots *plots, int ground, pw_error *error) {
+  if (ground ? plots->grounds == 0 : plots->paths == 0) return PW_OK;
+  pw_output *o = pw_figure_open_data (&plots->figures, ground ? "ground.dat" : "model-paths.dat", error);
   if (o == NULL) return PW_RESOURCE;
-  fputs ("# paths of the model: x [m], y [m]\n", pw_output_stream (o));
-  for (const pw_plot_path *path = plots->path; path < plots->path + plots->paths; path++)
-    for (int i = 0; i < path->points; i++)
-      data_row (pw_output_stream (o), path->point[i], 2, i < path->points - 1 ? "\n" : "\n\n");
+  FILE *f = pw_output_stream (o);
+  fprintf (f, "# %s: x [m], y [m]\n", ground ? "points of the ground" : "paths of the model");
+  for (int i = 0; ground && i < plots->grounds; i++) data_row (f, plots->ground[i], 2, "\n");
+  for (const pw_plot_path *path = plots->path; !ground && path < plots->path + plots->paths; path++)
+    for (int i = 0; i < path->points; i++) data_row (f, path->point[i], 2, i < path->points - 1 ? "\n" : "\n\n");
   return pw_output_finish (o, error);
 }
 
@@ -588,10 +579,7 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
               PW_DIGITS (pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), PW_DIGITS (plots->t_end, 4));
   int closeup = data_closeup (plots), status = data_tracks (plots, &plots->bodies, error);
   if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
-  if (status == PW_OK)
-    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
-                         plots->grounds, error);
-  if (status == PW_OK && plots->paths) status = data_paths (plots, error);
+  for (int ground = 1; ground >= 0 && status == PW_OK; ground--) status = data_points (plots, ground, error);
   if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
   if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   for (int i = 0; i < 2 && status == PW_OK; i++) status = figures_write (plots, names[i], closeup, error);

@@ -7,11 +7,6 @@
 /* The unit of symbols, relative to the size of the mechanism or, if that is less, 4 times the reach of its bodies. */
 #define SHAPES_UNIT 0.035
 
-/* Twice the area of the triangle a b c, positive if they turn to the left. */
-static double shapes_doubled_area (const double *a, const double *b, const double *c) {
-  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 static int shapes_order (const void *a, const void *b) {
   const double *p = a, *q = b;
   return p[0] != q[0] ? (p[0] > q[0]) - (p[0] < q[0]) : (p[1] > q[1]) - (p[1] < q[1]);
@@ -27,8 +22,11 @@ static void shapes_outline (pw_plot_body *shape) {
   for (int i = 0, least = 2; i < 2 * n - 1; i++) {
     const double *next = point[i < n ? i : 2 * n - 2 - i];
     if (i == n) least = corners + 1;
-    while (corners >= least && shapes_doubled_area (hull[corners - 2], hull[corners - 1], next) <= 1e-9 * size * size)
-      corners--;
+    for (; corners >= least; corners--) {
+      const double *a = hull[corners - 2], *b = hull[corners - 1];
+      const double doubled_area = (b[0] - a[0]) * (next[1] - a[1]) - (b[1] - a[1]) * (next[0] - a[0]);
+      if (doubled_area > 1e-9 * size * size) break; /* they turn to the left */
+    }
     if (i < 2 * n - 2) memcpy (hull[corners++], next, sizeof *hull);
   }
   shape->corners = corners < 3 ? 0 : corners;

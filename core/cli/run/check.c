@@ -135,16 +135,6 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
 
 enum { CHECK_LIMIT_OUTPUTS = 4, CHECK_LIMIT_SECONDS = 10 /* of processor time */ };
 
-static void check_limit (const pw_outcomes *set, pw_checked_limit *l, int first) {
-  const pw_bounds *bounds = pw_system_limits (set->system, l->row);
-  l->first = pw_outcome_value (set, first + 2), l->events = pw_outcome_value (set, first + 3);
-  for (int side = 0; side < 2 && !bounds->circle; side++) { /* reactions are -lambda; on a circle one is only a part */
-    const pw_functional *f = &set->functional[set->outcome[first + side].term[0]];
-    const double most = side ? bounds->most : bounds->least, used = -f->value / most;
-    if (isfinite (most) && most != 0 && !(used <= l->used)) l->used = used, l->t = f->t;
-  }
-}
-
 /* Modes at the start, and what the run of the model uses of the limits. */
 static int check_limits (pw_check *check, pw_error *error) {
   static const char *const prefix[CHECK_LIMIT_OUTPUTS] = { "max:", "min:", "event:", "events:" };
@@ -177,8 +167,18 @@ static int check_limits (pw_check *check, pw_error *error) {
   pw_limit_start (&seconds);
   if (status == PW_OK && pw_outcomes_run (&set, method, &settings, settings.span, NULL, &own) != PW_OK)
     check_add (&check->finding, "what the run uses of the limits of reactions is not known: %s", own.text);
-  for (int i = 0; status == PW_OK && own.status == PW_OK && i < check->limits; i++)
-    check_limit (&set, &check->limit[i], CHECK_LIMIT_OUTPUTS * i);
+  for (int i = 0; status == PW_OK && own.status == PW_OK && i < check->limits; i++) {
+    pw_checked_limit *l = &check->limit[i];
+    const int first = CHECK_LIMIT_OUTPUTS * i;
+    const pw_bounds *bounds = pw_system_limits (s, l->row);
+    l->first = pw_outcome_value (&set, first + 2), l->events = pw_outcome_value (&set, first + 3);
+    for (int side = 0; side < 2 && !bounds->circle;
+         side++) { /* reactions are -lambda; on a circle one is only a part */
+      const pw_functional *f = &set.functional[set.outcome[first + side].term[0]];
+      const double most = side ? bounds->most : bounds->least, used = -f->value / most;
+      if (isfinite (most) && most != 0 && !(used <= l->used)) l->used = used, l->t = f->t;
+    }
+  }
   pw_outcomes_close (&set);
   return own.status == PW_RESOURCE ? pw_fail (error, own.status, "%s", own.text) : status;
 }

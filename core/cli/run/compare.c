@@ -650,12 +650,6 @@ static double compare_order (const pw_compare *compare, const pw_row *row) {
   return order > 0 && fabs (order - coarser_order) <= COMPARE_AGREE * order ? order : NAN;
 }
 
-/* 1 if n sorted times of a row with this sum suffice: they agree, or take long. */
-static int compare_is_enough (const double *cpu, int n, double sum) {
-  const int agree = n > 0 && cpu[n - 1] - cpu[0] <= COMPARE_QUIET * cpu[0], is_long = sum > COMPARE_ENOUGH;
-  return (n >= COMPARE_FEW && (agree || is_long)) || (n >= COMPARE_FEWEST && agree && is_long);
-}
-
 /* Measures runs without samples; the processor time of the row is their median. */
 static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
@@ -665,7 +659,9 @@ static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *er
     if (status != PW_OK) return status;
     sum += cpu[n++] = row->cpu;
     gsl_sort (cpu, 1, (size_t)n);
-    if (compare->repeats_text == NULL && compare_is_enough (cpu, n, sum)) break;
+    const int agree = cpu[n - 1] - cpu[0] <= COMPARE_QUIET * cpu[0], is_long = sum > COMPARE_ENOUGH;
+    if (compare->repeats_text) continue;
+    if ((n >= COMPARE_FEW && (agree || is_long)) || (n >= COMPARE_FEWEST && agree && is_long)) break;
   }
   row->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
   row->value[COLUMN_REPEATS] = n;

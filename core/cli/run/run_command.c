@@ -621,20 +621,15 @@ static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
   comparison_serialise (&command->comparison, archive);
 }
 
-/* 1 if the checkpoint that was loaded lies within the run and has the rows up to its time. */
-static int checkpoints_plausible (const pw_run_cli *command) {
-  double t = pw_run_time (command->run), rows = (double)command->rows, expected = rows, cpu = command->cpu;
-  if (command->table && command->row_interval > 0) expected = floor (t / command->row_interval) + 1;
-  return t <= command->settings.span && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0;
-}
-
 /* After everything is open: loads the state of the checkpoint that is resumed, if any; schedules the next one. */
 static int checkpoints_resume (pw_run_cli *command, pw_error *error) {
   pw_checkpoints *checkpoints = &command->checkpoints;
   if (checkpoints->resume_path) {
     checkpoints_serialise (command, &checkpoints->resumed.state);
     if (pw_run_load (command->run, &checkpoints->resumed.state, error) != PW_OK) return error->status;
-    if (!checkpoints_plausible (command))
+    const double t = pw_run_time (command->run), rows = (double)command->rows, cpu = command->cpu;
+    const double expected = command->table && command->row_interval > 0 ? floor (t / command->row_interval) + 1 : rows;
+    if (!(t <= command->settings.span && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0))
       return pw_fail (error, PW_INPUT,
                       "the checkpoint %s is not that of a run: its time, number of rows or processor time "
                       "is impossible",

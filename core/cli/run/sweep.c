@@ -511,18 +511,6 @@ static int journal_write (pw_journal *journal, const char *text, size_t size, pw
   return PW_OK;
 }
 
-/* Stores the offset of each row; stops at a line that is incomplete, damaged, a duplicate or of another part. */
-static void journal_read_rows (pw_journal *journal, const pw_plan *plan, const journal_map *map, const char *at) {
-  journal_line line;
-  for (; journal_line_read (at, map->end, &line); at += line.line_size) {
-    long k = line.row / plan->parts;
-    if (line.row % plan->parts != plan->part - 1 || k >= journal->rows || journal->offset[k] != 0) break;
-    journal->offset[k] = (off_t)(at - map->begin);
-    journal->done++;
-  }
-  journal->size = (off_t)(at - map->begin);
-}
-
 /* Verifies that the journal is one of this sweep, and reads its rows; journal->size is where the next row goes. */
 static int journal_read (pw_journal *journal, const pw_plan *plan, const journal_map *map, pw_error *error) {
   char difference[400];
@@ -540,7 +528,14 @@ static int journal_read (pw_journal *journal, const pw_plan *plan, const journal
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
                     journal->path, difference);
-  journal_read_rows (journal, plan, map, rows);
+  journal_line line; /* until one that is incomplete, damaged, a duplicate or of another part */
+  for (; journal_line_read (rows, map->end, &line); rows += line.line_size) {
+    long k = line.row / plan->parts;
+    if (line.row % plan->parts != plan->part - 1 || k >= journal->rows || journal->offset[k] != 0) break;
+    journal->offset[k] = (off_t)(rows - map->begin);
+    journal->done++;
+  }
+  journal->size = (off_t)(rows - map->begin);
   return PW_OK;
 }
 
