@@ -119,15 +119,24 @@ typedef struct {
   pw_folder folder;
 } pw_files;
 
+/* The number of an option, read with the command line. */
+typedef struct {
+  const char *text; /* as given; NULL: it is not */
+  double number;
+} pw_given;
+static inline double pw_given_or (pw_given x, double otherwise) {
+  return x.text ? x.number : otherwise;
+}
+
 /* A command line: its arguments and the options shared by several commands, NULL if not given; and what most commands
  * use, released after the command.  The structure of options of every command begins with one. */
 typedef struct {
   const char **argument; /* ended by NULL; NULL if there are none */
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
-  const char *max_file;
   const char **method_files;
-  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width, *until;
+  const char *method, *specialise, *width, *until;
+  pw_given max_file, t_end, step, rtol, atol, max_steps, limit, jobs;
   const char *table, *json, *plots; /* -o, --json, --plots of PW_RESULTS_OPTIONS */
   pw_cli_model m;                   /* opened by pw_cli_open */
   pw_files files;                   /* opened by pw_files_open */
@@ -154,11 +163,13 @@ typedef struct {
 #define PW_COMMAND(name) extern const pw_command pw_cli_##name;
 PW_COMMANDS (PW_COMMAND)
 
-/* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  The member
+/* Entries of a table of options: a text, a number of a domain (a pw_given), a list of texts (the option may be repeated), a flag (an int).  The member
  * of the structure `type` is zero if the option is not given; texts are released with the command line.  `name`:
  * "every"; `letter`: 'e', or 0 without a short form; `value`: its name in the help, "DT". */
 #define PW_TEXT_OPTION(type, member, name, letter, value, help) \
   { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 0, help, value }
+#define PW_NUMBER_OPTION(type, member, name, letter, value, domain, help) \
+  { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 1 + (domain), help, value }
 #define PW_LIST_OPTION(type, member, name, letter, value, help) \
   { name, letter, POPT_ARG_ARGV, (void *)offsetof (type, member), 0, help, value }
 #define PW_FLAG_OPTION(type, member, name, help) \
@@ -177,26 +188,29 @@ PW_COMMANDS (PW_COMMAND)
                       "Set a parameter of the model to a number or an expression such as 30*deg; repeatable"), \
       PW_LIST_OPTION (pw_cli_line, starts, "start", 0, "STATE=VALUE",                                          \
                       "Set the initial value of a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable"),   \
-      PW_TEXT_OPTION (pw_cli_line, max_file, "max-file", 0, "MB", "Read model files of up to this size (default 64)")
-#define PW_STEP_OPTIONS                                                                             \
-  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),                         \
-      PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),    \
-      PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"), \
-      PW_TEXT_OPTION (pw_cli_line, max_steps, "max-steps", 0, "N",                                  \
-                      "Stop adaptive methods after this many attempted steps (default 1e7)"),       \
-      PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",                                    \
-                      "Stop a run after this much processor time (default unlimited)"),             \
+      PW_NUMBER_OPTION (pw_cli_line, max_file, "max-file", 0, "MB", PW_POSITIVE,                               \
+                        "Read model files of up to this size (default 64)")
+#define PW_STEP_OPTIONS                                                                                            \
+  PW_NUMBER_OPTION (pw_cli_line, t_end, "t-end", 't', "T", PW_POSITIVE, "Final time [s]"),                         \
+      PW_NUMBER_OPTION (pw_cli_line, step, "step", 0, "H", PW_POSITIVE, "Step size of fixed-step methods [s]"),    \
+      PW_NUMBER_OPTION (pw_cli_line, rtol, "rtol", 0, "R", PW_POSITIVE, "Relative tolerance of adaptive methods"), \
+      PW_NUMBER_OPTION (pw_cli_line, max_steps, "max-steps", 0, "N", PW_COUNT,                                     \
+                        "Stop adaptive methods after this many attempted steps (default 1e7)"),                    \
+      PW_NUMBER_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", PW_POSITIVE,                                    \
+                        "Stop a run after this much processor time (default unlimited)"),                          \
       PW_ENGINE_OPTION
 #define PW_UNTIL_OPTION                                        \
   PW_TEXT_OPTION (pw_cli_line, until, "until", 0, "CONDITION", \
                   "End the run when a condition on columns becomes true, such as \"car.x > 10\"")
-#define PW_LIMIT_OPTION \
-  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)")
+#define PW_LIMIT_OPTION                                                     \
+  PW_NUMBER_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", PW_POSITIVE, \
+                    "Stop after this much processor time (default unlimited)")
 #define PW_ENGINE_OPTION                                                                                    \
   PW_TEXT_OPTION (                                                                                          \
       pw_cli_line, specialise, "specialise", 0, "WHEN",                                                     \
       "Compile code for this scene alone, which runs faster: auto (if the runs are long enough, default), " \
       "always or never")
+#define PW_JOBS_OPTION(help) PW_NUMBER_OPTION (pw_cli_line, jobs, "jobs", 'j', "N", PW_COUNT, help)
 #define PW_METHOD_FILE_OPTION                                            \
   PW_LIST_OPTION (pw_cli_line, method_files, "method-file", 0, "FILE.c", \
                   "Compile a file of methods of your own, which are then used by name; repeatable")
@@ -205,8 +219,8 @@ PW_COMMANDS (PW_COMMAND)
       PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",                 \
                       "Integrator and stabilisation, see `pinwheel list methods`"), \
       PW_METHOD_FILE_OPTION, PW_STEP_OPTIONS,                                       \
-      PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A",                            \
-                      "Absolute tolerance of every state (default rtol times its scale)")
+      PW_NUMBER_OPTION (pw_cli_line, atol, "atol", 0, "A", PW_POSITIVE,             \
+                        "Absolute tolerance of every state (default rtol times its scale)")
 
 /* Reads the command line (argv[0] is not read), runs the command and reports its error; returns the exit status.  all:
  * the commands, ended by NULL, for messages, or NULL. */
@@ -255,8 +269,7 @@ double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 
 /* Settings except `ledger` and `specialised`, whose span is the final time, and limit of a run, from options and
  * defaults.  The limit must outlive the run. */
-int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,
-                     pw_error *error);
+void pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit);
 
 /* The status of a command that was stopped: PW_INTERRUPTED after a signal, with a message that results are incomplete;
  * else PW_METHOD with an error that names --limit. */
@@ -472,7 +485,7 @@ int pw_fingerprint_differ (pw_fingerprint a, pw_fingerprint b, const char *ignor
 /* ---- Independent tasks in several threads ---- */
 
 /* The number of concurrent tasks: the value of --jobs, else OMP_NUM_THREADS, else that of available processors. */
-int pw_parallel_jobs (const char *text, int *jobs, pw_error *error);
+int pw_parallel_jobs (const pw_cli_line *line);
 
 /* Task number i; returns a status. */
 typedef int pw_task (void *context, int i, pw_error *error);

@@ -129,6 +129,12 @@ static int command_read (const pw_command *command, const pw_command *const *all
   if (number < -1) return command_refuse (command, all, line, number, error); /* -1: no more options */
   line->argument = poptGetArgs (line->popt);
   while (line->argument && line->argument[line->arguments]) line->arguments++;
+  for (const struct poptOption *o = command->options; !command_is_end (o); o++) {
+    pw_given *x = (pw_given *)(void *)((char *)line + (size_t)o->arg);
+    const char *option = PW_PRINTED (40, "--%s", o->longName ? o->longName : "");
+    if (o->val && pw_cli_number (option, x->text, (pw_domain)(o->val - 1), &x->number, error) != PW_OK)
+      return error->status;
+  }
   if (command->any_arguments) return PW_OK;
   if (line->arguments == 0)
     return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel %s %s", command->name, command->synopsis);
@@ -270,34 +276,21 @@ double pw_axis_value (const pw_axis *axis, long i) {
   return low / last * (last - k) + high / last * k; /* the products were too large */
 }
 
-int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,
-                     pw_error *error) {
-  double max_steps = PW_MAX_STEPS;
-  *limit = (pw_limit){ .seconds = INFINITY };
-  *settings = (pw_settings){ .span = defaults->t_end,
-                             .step = defaults->step,
-                             .rtol = defaults->rtol,
+void pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings,
+                      pw_limit *limit) {
+  *limit = (pw_limit){ .seconds = pw_given_or (line->limit, INFINITY) };
+  *settings = (pw_settings){ .span = pw_given_or (line->t_end, defaults->t_end),
+                             .step = pw_given_or (line->step, defaults->step),
+                             .rtol = pw_given_or (line->rtol, defaults->rtol),
+                             .atol = line->atol.number,
+                             .max_steps = (long)pw_given_or (line->max_steps, PW_MAX_STEPS), /* PW_COUNT: at most 1e9 */
                              .stop = pw_limit_over,
                              .stop_context = limit,
                              .methods = line->methods };
-  const struct {
-    const char *option, *text;
-    double *value;
-  } options[] = { { "--t-end", line->t_end, &settings->span },
-                  { "--step", line->step, &settings->step },
-                  { "--rtol", line->rtol, &settings->rtol },
-                  { "--atol", line->atol, &settings->atol },
-                  { "--limit", line->limit, &limit->seconds } };
-  for (size_t i = 0; i < sizeof options / sizeof *options; i++)
-    if (pw_cli_number (options[i].option, options[i].text, PW_POSITIVE, options[i].value, error) != PW_OK)
-      return PW_INPUT;
-  int status = pw_cli_number ("--max-steps", line->max_steps, PW_COUNT, &max_steps, error);
-  settings->max_steps = (long)max_steps; /* PW_COUNT: at most 1e9 */
-  return status;
 }
 
 int pw_cli_incomplete (const pw_cli_line *line, pw_error *error) {
-  if (!pw_stop) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", line->limit);
+  if (!pw_stop) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", line->limit.text);
   pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
   return PW_INTERRUPTED;
 }
@@ -310,12 +303,12 @@ int pw_cli_adaptive (const pw_method *const *own, const char *method) {
 
 void pw_cli_report_unused (const char *method, const pw_cli_line *line) {
   int adaptive = pw_cli_adaptive (line->methods, method);
-  if (adaptive == 1 && line->step && !line->rtol && !line->atol)
+  if (adaptive == 1 && line->step.text && !line->rtol.text && !line->atol.text)
     pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
-  if (adaptive == 0 && line->max_steps)
+  if (adaptive == 0 && line->max_steps.text)
     pw_cli_say ("pinwheel: --max-steps has no effect: %s takes as many steps as --step requires\n", method);
-  if (adaptive == 0 && (line->rtol || line->atol) && !line->step)
-    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", line->rtol ? "rtol" : "atol", method);
+  if (adaptive == 0 && (line->rtol.text || line->atol.text) && !line->step.text)
+    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", line->rtol.text ? "rtol" : "atol", method);
 }
 
 /* The model of a command line: opens it with --set and --start; its parameters, changed initial values and defaults. */
@@ -439,11 +432,10 @@ static int cli_method_files (pw_cli_line *line, pw_error *error) {
 
 int pw_cli_file (pw_cli_line *line, pw_error *error) {
   const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
-  double size = PW_FILE_DEFAULT_BYTES >> 20;
-  if (pw_cli_number ("--max-file", line->max_file, PW_POSITIVE, &size, error) != PW_OK) return error->status;
-  if (size < 1e-3) return pw_fail (error, PW_INPUT, "--max-file %s: expected at least 0.001 MB", line->max_file);
+  const double size = pw_given_or (line->max_file, PW_FILE_DEFAULT_BYTES >> 20);
+  if (size < 1e-3) return pw_fail (error, PW_INPUT, "--max-file %s: expected at least 0.001 MB", line->max_file.text);
   if (size > largest)
-    return pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file, largest);
+    return pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file.text, largest);
   line->m.file = pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
   if (line->m.file == NULL || cli_method_files (line, error) != PW_OK) return error->status;
   pw_run_defaults *d = &line->m.defaults;

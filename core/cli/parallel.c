@@ -11,16 +11,13 @@
 
 enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 
-int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
+int pw_parallel_jobs (const pw_cli_line *line) {
   const char *threads = getenv ("OMP_NUM_THREADS");
   long wanted = threads ? strtol (threads, NULL, 10) : 0;
   cpu_set_t set; /* the processors that this process may use */
   if (wanted <= 0 && sched_getaffinity (0, sizeof set, &set) == 0) wanted = CPU_COUNT (&set);
   if (wanted <= 0) wanted = sysconf (_SC_NPROCESSORS_ONLN);
-  double count = wanted > 0 ? (double)wanted : 1;
-  int status = pw_cli_number ("--jobs", text, PW_COUNT, &count, error);
-  *jobs = (int)fmin (count, PARALLEL_JOBS);
-  return status;
+  return (int)fmin (pw_given_or (line->jobs, wanted > 0 ? (double)wanted : 1), PARALLEL_JOBS);
 }
 
 /* For timed tasks (below): cores to which threads are bound. */

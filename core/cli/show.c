@@ -423,7 +423,7 @@ static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
   pw_settings settings;
   pw_limit limit;
   if (t > 0) defaults.t_end = t;
-  if (pw_cli_settings (line, &defaults, &settings, &limit, error) != PW_OK) return error->status;
+  pw_cli_settings (line, &defaults, &settings, &limit);
   pw_limit_start (&limit);
   pw_run *run = pw_limit_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
@@ -442,17 +442,17 @@ static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
 typedef struct {
   pw_cli_line line;
   int matrices, yaml, code; /* 1: shown in place of the description of the model */
-  const char *at;           /* time at which matrices are shown, as text */
+  pw_given at;              /* time at which matrices are shown [s] */
 } show_line;
 
 static int show_command (void *options, pw_error *error) {
   show_line *given = options;
   const pw_cli_model *m = &given->line.m;
-  double t = 0;
-  int matrices = given->matrices || given->at, status = pw_cli_number ("--at", given->at, PW_NONNEGATIVE, &t, error);
-  if (status == PW_OK && matrices + given->yaml + given->code > 1)
-    status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", given->at ? "at T" : "matrices");
-  if (status == PW_OK) status = pw_cli_requires ("--limit", given->line.limit, "--at", given->at != NULL, error);
+  int matrices = given->matrices || given->at.text, status = PW_OK;
+  if (matrices + given->yaml + given->code > 1)
+    status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", given->at.text ? "at T" : "matrices");
+  if (status == PW_OK)
+    status = pw_cli_requires ("--limit", given->line.limit.text, "--at", given->at.text != NULL, error);
   if (status == PW_OK) status = pw_cli_open (&given->line, error);
   if (status == PW_OK && given->code) {
     char *text = pw_cli_source (m->system, error);
@@ -462,7 +462,7 @@ static int show_command (void *options, pw_error *error) {
   } else if (status == PW_OK && given->yaml)
     status = yaml_model (m, error);
   else if (status == PW_OK && matrices)
-    status = show_matrices (&given->line, t, error);
+    status = show_matrices (&given->line, given->at.number, error);
   else if (status == PW_OK)
     show_model (m);
   return status;
@@ -471,8 +471,8 @@ static int show_command (void *options, pw_error *error) {
 static const struct poptOption show_options[] = {
   PW_OPTION_GROUP ("Output"),
   PW_FLAG_OPTION (show_line, matrices, "matrices", "Show M, J and gamma at the initial state instead"),
-  PW_TEXT_OPTION (show_line, at, "at", 0, "T",
-                  "Show M, J and gamma at time T [s] of a run with the model's default method"),
+  PW_NUMBER_OPTION (show_line, at, "at", 0, "T", PW_NONNEGATIVE,
+                    "Show M, J and gamma at time T [s] of a run with the model's default method"),
   PW_LIMIT_OPTION,
   PW_FLAG_OPTION (show_line, code, "c", "Write the C code of the specialised scene, as --specialise compiles it"),
   PW_FLAG_OPTION (show_line, yaml, "yaml", "Write the model as a text model with the same trajectory"),

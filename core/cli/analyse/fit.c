@@ -20,8 +20,8 @@ typedef enum { FIT_ALONG, FIT_EVENT, FIT_NUMBER } fit_kind;
 
 typedef struct {
   pw_cli_line line;
-  const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *confidence_text, *starts_text,
-      *jobs_text, *time_name, *time_scale_text, *time_offset_text;
+  const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *time_name;
+  pw_given confidence_given, starts_given, time_scale, time_offset;
   const char **free, **sigma_texts;
   pw_unknowns unknowns;
   double confidence; /* probability of confidence intervals */
@@ -175,7 +175,7 @@ static int data_check_times (const pw_fit *fit, pw_error *error) {
                     FIT_TIMES " are after the run, which ends at %.6g s: give --t-end, or --time-offset %.15g, which "
                               "lets them begin at 0",
                     fit->data_path, first, last, t_end, -first);
-  if (last > FIT_LONGER * t_end && fit->line.t_end == NULL)
+  if (last > FIT_LONGER * t_end && fit->line.t_end.text == NULL)
     return pw_fail (error, PW_INPUT,
                     FIT_TIMES " last far longer than the run, which ends at %.6g s: give --time-scale 1e-3 if they are "
                               "in ms, else --t-end",
@@ -189,26 +189,22 @@ static void data_report (const pw_fit *fit) {
   if (fit->timed == 0) return;
   for (int i = 0; i < fit->columns * fit->rows; i++)
     empty += fit->column_kind[i / fit->rows] == FIT_ALONG && i % fit->rows < fit->timed && isnan (fit->data[i]);
-  if (covered < 0.9 * t_end || (fit->last > t_end * (1 + 1e-9) && fit->line.t_end == NULL))
+  if (covered < 0.9 * t_end || (fit->last > t_end * (1 + 1e-9) && fit->line.t_end.text == NULL))
     pw_cli_say ("pinwheel: " FIT_TIMES " cover %.3g %% of the run, which ends at %.6g s%s\n", fit->data_path,
                 fit->first, fit->last, 100 * covered / t_end, t_end,
-                fit->line.t_end || data_along (fit) < fit->columns ? "" : "; runs end at the last datum");
+                fit->line.t_end.text || data_along (fit) < fit->columns ? "" : "; runs end at the last datum");
   if (empty || fit->untimed || fit->late)
     pw_cli_say ("pinwheel: --data %s: left out are %s, %s without a time, %s after --t-end\n", fit->data_path,
                 PW_COUNTED (empty, "empty cell"), PW_COUNTED (fit->untimed, "row"), PW_COUNTED (fit->late, "row"));
 }
 
 /* Converts times to seconds.  time: 1 for a column with times, of rows or events, or with their deviations. */
-static int data_convert_times (pw_fit *fit, double *table, const unsigned char *time, int columns, pw_error *error) {
-  double scale = 1, offset = 0;
-  if (pw_cli_number ("--time-scale", fit->time_scale_text, PW_POSITIVE, &scale, error) != PW_OK ||
-      pw_cli_number ("--time-offset", fit->time_offset_text, PW_REAL, &offset, error) != PW_OK)
-    return error->status;
+static void data_convert_times (pw_fit *fit, double *table, const unsigned char *time, int columns) {
+  const double scale = pw_given_or (fit->time_scale, 1), offset = fit->time_offset.number;
   for (int i = 0; i < columns * fit->rows; i++) {
     const int column = i / fit->rows;
     if (time[column]) table[i] = scale * (table[i] + (column > fit->columns ? 0 : offset / scale));
   }
-  return PW_OK;
 }
 
 static int data_is_along (const pw_fit *fit, int j) {
@@ -218,7 +214,7 @@ static int data_is_along (const pw_fit *fit, int j) {
 /* Copies the rows of the table that have a time, up to --t-end; after them, if there are outputs, the others without
  * time and data along the run. */
 static int data_keep_rows (pw_fit *fit, const double *table, int columns, pw_error *error) {
-  const double t_end = fit->line.t_end ? fit->t_end * (1 + 1e-9) : INFINITY;
+  const double t_end = fit->line.t_end.text ? fit->t_end * (1 + 1e-9) : INFINITY;
   const int rows = fit->rows, along = data_along (fit), outputs = along < fit->columns;
   int with_time = 0;
   fit->table = pw_arena_alloc (&fit->line.arena, (size_t)columns * (size_t)rows * sizeof *table);
@@ -265,7 +261,8 @@ static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error
     if (isnan (given[i].number))
       column[count] = given[i].text, time[count] = time[1 + i], unit[count++] = fit->column_unit[i];
   double *table = pw_read_columns (fit->data_path, column, unit, count, NULL, &fit->rows, error);
-  int status = table ? data_convert_times (fit, table, time, count, error) : error->status;
+  int status = table ? PW_OK : error->status;
+  if (table) data_convert_times (fit, table, time, count);
   for (int i = 0; i < fit->rows && status == PW_OK && !along; i++) table[i] = NAN;
   if (status == PW_OK) status = data_keep_rows (fit, table, count, error);
   free (table);
@@ -967,20 +964,16 @@ static int fit_draw (const pw_fit *fit, pw_error *error) {
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
 
 static int fit_options (pw_fit *fit, pw_error *error) {
-  double starts = 1;
-  fit->confidence = 0.95;
+  const double starts = pw_given_or (fit->starts_given, 1);
+  fit->confidence = pw_given_or (fit->confidence_given, 0.95);
+  fit->starts = (int)starts, fit->jobs = pw_parallel_jobs (&fit->line);
   if (fit->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
   if (fit->columns_text == NULL)
     return pw_fail (error, PW_INPUT, "nothing to compare: add --columns NAME,..., columns of the data such as frame.x");
-  int status = pw_cli_number ("--confidence", fit->confidence_text, PW_POSITIVE, &fit->confidence, error);
-  if (status == PW_OK && !(fit->confidence < 1))
-    status = pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", fit->confidence_text);
-  if (status == PW_OK) status = pw_cli_number ("--starts", fit->starts_text, PW_COUNT, &starts, error);
-  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  fit->starts = (int)starts;
-  if (status == PW_OK)
-    status = pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
-  return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
+  if (!(fit->confidence < 1))
+    return pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", fit->confidence_given.text);
+  if (starts > 1e5) return pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  return pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
 }
 
 static int fit_open (pw_fit *fit, pw_error *error) {
@@ -1048,8 +1041,8 @@ static const struct poptOption fit_options_table[] = {
       "Measured data, used up to --t-end: a table with t and columns named as those of `run`, in any order and "
       "unit; empty cells and nan are gaps"),
   PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
-  PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
-  PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
+  PW_NUMBER_OPTION (pw_fit, time_scale, "time-scale", 0, "K", PW_POSITIVE, "Factor of these times, 1e-3 for ms"),
+  PW_NUMBER_OPTION (pw_fit, time_offset, "time-offset", 0, "T", PW_REAL, "Added to the scaled times [s]"),
   PW_TEXT_OPTION (
       pw_fit, columns_text, "columns", 0, "NAME,...",
       "Columns of the data to compare with the model: columns of `run`; or, in any row, other outputs of a run, such "
@@ -1060,11 +1053,13 @@ static const struct poptOption fit_options_table[] = {
       "its domain; repeatable"),
   PW_LIST_OPTION (pw_fit, sigma_texts, "sigma", 0, "COLUMN=VALUE",
                   "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
-  PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
-  PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
-                  "Search from the model's values and from N - 1 points between the bounds, without bounds within the "
-                  "value's own size of it (default 1)"),
-  PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_NUMBER_OPTION (pw_fit, confidence_given, "confidence", 0, "P", PW_POSITIVE,
+                    "Probability of confidence intervals (default 0.95)"),
+  PW_NUMBER_OPTION (
+      pw_fit, starts_given, "starts", 0, "N", PW_COUNT,
+      "Search from the model's values and from N - 1 points between the bounds, without bounds within the "
+      "value's own size of it (default 1)"),
+  PW_JOBS_OPTION ("Number of concurrent runs (default: one per processor)"),
   PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv",
                   "Write data, model values and residuals, or as FILE.npz or FILE.json"),
   PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),

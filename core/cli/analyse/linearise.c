@@ -8,7 +8,7 @@
 
 typedef struct {
   pw_cli_line line;
-  const char *t_text;                       /* of --at */
+  pw_given at;
   const char *name, *json_path;             /* of -o and --json, or NULL */
   const char *page_path;                    /* of --animate, or NULL */
   const char **hold_texts;                  /* of --hold */
@@ -90,7 +90,7 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
 static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   const pw_run_defaults *d = &cmd->line.m.defaults;
   pw_settings settings;
-  if (pw_cli_settings (&cmd->line, d, &settings, &cmd->limit, error) != PW_OK) return error->status;
+  pw_cli_settings (&cmd->line, d, &settings, &cmd->limit);
   if (!cmd->steady) settings.span = fmax (settings.span, cmd->t); /* else after --at: signals are constant in it */
   pw_limit_start (&cmd->limit);
   if (cmd->steady) {
@@ -459,10 +459,10 @@ static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
 
 static int linearise_command (void *options, pw_error *error) {
   pw_linearise_command *cmd = options;
-  int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
-  if (status == PW_OK && cmd->hold_texts && !cmd->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
-  if (status == PW_OK)
-    status = pw_cli_requires ("--limit", cmd->line.limit, "--at or --steady", cmd->t_text || cmd->steady, error);
+  if (cmd->hold_texts && !cmd->steady) return pw_fail (error, PW_INPUT, "--hold needs --steady");
+  cmd->t = cmd->at.number;
+  int status =
+      pw_cli_requires ("--limit", cmd->line.limit.text, "--at or --steady", cmd->at.text || cmd->steady, error);
   if (status == PW_OK) status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = linearise_select (cmd, error);
   if (status == PW_OK) status = linearise_open_files (cmd, error);
@@ -496,8 +496,8 @@ static int linearise_command (void *options, pw_error *error) {
 
 static const struct poptOption linearise_options[] = {
   PW_OPTION_GROUP ("Linearisation"),
-  PW_TEXT_OPTION (pw_linearise_command, t_text, "at", 0, "T",
-                  "At time T [s] of a run with the model's default method (default 0)"),
+  PW_NUMBER_OPTION (pw_linearise_command, at, "at", 0, "T", PW_NONNEGATIVE,
+                    "At time T [s] of a run with the model's default method (default 0)"),
   PW_FLAG_OPTION (pw_linearise_command, steady, "steady",
                   "At the steady motion that is reached from the initial state; signals are those of --at"),
   PW_HOLD_OPTION (pw_linearise_command, hold_texts),

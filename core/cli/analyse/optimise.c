@@ -29,7 +29,8 @@ typedef struct {
 
 typedef struct {
   pw_cli_line line;
-  const char *maximise, *minimise, *path, *json_path, *plots_path, *starts_text, *seed_text, *jobs_text;
+  const char *maximise, *minimise, *path, *json_path, *plots_path;
+  pw_given starts_given, seed_given;
   const char **free, **subject_to;
   pw_unknowns unknowns;
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
@@ -623,13 +624,13 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
   const pw_cli_line *line = &problem->line;
   const struct {
     const char *option, *value;
-  } given[] = { { "--max-file", line->max_file },
+  } given[] = { { "--max-file", line->max_file.text },
                 { "--method", line->method },
-                { "--t-end", line->t_end },
-                { "--step", line->step },
-                { "--rtol", line->rtol },
-                { "--atol", line->atol },
-                { "--max-steps", line->max_steps },
+                { "--t-end", line->t_end.text },
+                { "--step", line->step.text },
+                { "--rtol", line->rtol.text },
+                { "--atol", line->atol.text },
+                { "--max-steps", line->max_steps.text },
                 { "--until", line->until },
                 { "--specialise", problem->unknowns.engine.code ? "always" : line->specialise } };
   fputs ("# pinwheel run ", f);
@@ -691,18 +692,14 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
-  double starts = 10;
-  problem->least = INFINITY, problem->seed = 1;
+  const double starts = pw_given_or (problem->starts_given, 10);
+  problem->least = INFINITY, problem->seed = pw_given_or (problem->seed_given, 1);
+  problem->starts = (int)starts, problem->jobs = pw_parallel_jobs (&problem->line);
   if (!problem->maximise == !problem->minimise)
     return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
-  int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
-  if (status == PW_OK) status = pw_cli_number ("--seed", problem->seed_text, PW_COUNT, &problem->seed, error);
-  if (status == PW_OK) status = pw_parallel_jobs (problem->jobs_text, &problem->jobs, error);
-  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  if (status == PW_OK)
-    status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
-  if (status != PW_OK) return status;
-  problem->starts = (int)starts;
+  if (starts > 1e5) return pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  if (pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error) != PW_OK)
+    return error->status;
   for (const char **given = problem->subject_to; given && *given; given++) count++;
   problem->output = pw_arena_alloc (&problem->line.arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
   problem->unit = pw_arena_alloc (&problem->line.arena, count * sizeof *problem->unit);
@@ -827,10 +824,10 @@ static const struct poptOption optimise_options[] = {
                   "repeatable"),
   PW_LIST_OPTION (pw_optimise, subject_to, "subject-to", 0, "OUTPUT<=VALUE",
                   "Constraint, or OUTPUT>=VALUE, which may be violated by 1e-6 of VALUE; repeatable"),
-  PW_TEXT_OPTION (pw_optimise, starts_text, "starts", 0, "N",
-                  "Search from the model's values and N - 1 points between the bounds (default 10)"),
-  PW_TEXT_OPTION (pw_optimise, seed_text, "seed", 0, "N", "Seed of these points (default 1)"),
-  PW_TEXT_OPTION (pw_optimise, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_NUMBER_OPTION (pw_optimise, starts_given, "starts", 0, "N", PW_COUNT,
+                    "Search from the model's values and N - 1 points between the bounds (default 10)"),
+  PW_NUMBER_OPTION (pw_optimise, seed_given, "seed", 0, "N", PW_COUNT, "Seed of these points (default 1)"),
+  PW_JOBS_OPTION ("Number of concurrent runs (default: one per processor)"),
   PW_TEXT_OPTION (pw_optimise, path, "output", 'o', "FILE.yaml",
                   "Write the values, with the command of their run as a comment"),
   PW_TEXT_OPTION (pw_optimise, json_path, "json", 0, "FILE.json", "Write a summary"),

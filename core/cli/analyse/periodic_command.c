@@ -16,7 +16,8 @@ enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each from the state af
 
 typedef struct {
   pw_cli_line line;
-  const char *period_text, *periods_text, *guess_text, *vary_text;
+  const char *period_text, *vary_text;
+  pw_given periods, guess;
   pw_limit limit;
   pw_periodic_settings settings;
   const char *source; /* of the period: "of the signals", "--period", "found" */
@@ -38,23 +39,22 @@ static const int periodic_settling[] = { 0, 10, 100 };
 _Static_assert(sizeof periodic_settling / sizeof *periodic_settling == PW_PERIODIC_ATTEMPTS, "one for each attempt");
 
 static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
-  double periods = 1;
+  const double periods = pw_given_or (cmd->periods, 1);
   cmd->settings.free = cmd->period_text && strcmp (cmd->period_text, "free") == 0;
   cmd->source = cmd->settings.free ? "found" : cmd->period_text ? "--period" : "of the signals";
-  if (cmd->guess_text && !cmd->settings.free)
-    return pw_fail (error, PW_INPUT, "--guess %s: only with --period free", cmd->guess_text);
-  if (cmd->periods_text && cmd->period_text)
-    return pw_fail (error, PW_INPUT, "--periods %s: not together with --period", cmd->periods_text);
-  int status = pw_cli_number ("--guess", cmd->guess_text, PW_POSITIVE, &cmd->settings.period, error);
-  if (status == PW_OK) status = pw_cli_number ("--periods", cmd->periods_text, PW_COUNT, &periods, error);
-  if (status == PW_OK && !cmd->settings.free)
-    status = pw_cli_number ("--period", cmd->period_text, PW_POSITIVE, &cmd->settings.period, error);
-  if (status == PW_OK && cmd->settings.period > 0 && cmd->settings.period < PERIODIC_LEAST)
-    status = pw_fail (error, PW_INPUT, "%s: expected at least %g s", cmd->guess_text ? "--guess" : "--period",
-                      PERIODIC_LEAST);
-  if (status == PW_OK && periods > PERIODIC_PERIODS)
-    status = pw_fail (error, PW_INPUT, "--periods %s: expected at most %d", cmd->periods_text, PERIODIC_PERIODS);
-  if (status != PW_OK) return status;
+  if (cmd->guess.text && !cmd->settings.free)
+    return pw_fail (error, PW_INPUT, "--guess %s: only with --period free", cmd->guess.text);
+  if (cmd->periods.text && cmd->period_text)
+    return pw_fail (error, PW_INPUT, "--periods %s: not together with --period", cmd->periods.text);
+  cmd->settings.period = cmd->guess.number;
+  if (!cmd->settings.free &&
+      pw_cli_number ("--period", cmd->period_text, PW_POSITIVE, &cmd->settings.period, error) != PW_OK)
+    return error->status;
+  if (cmd->settings.period > 0 && cmd->settings.period < PERIODIC_LEAST)
+    return pw_fail (error, PW_INPUT, "%s: expected at least %g s", cmd->guess.text ? "--guess" : "--period",
+                    PERIODIC_LEAST);
+  if (periods > PERIODIC_PERIODS)
+    return pw_fail (error, PW_INPUT, "--periods %s: expected at most %d", cmd->periods.text, PERIODIC_PERIODS);
   cmd->settings.periods = (int)periods;
   double period = pw_system_period (cmd->line.m.system);
   if (cmd->period_text || cmd->vary_text || period > 0) return PW_OK;
@@ -68,13 +68,12 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   pw_settings settings = { .rtol = 0 };
   pw_run_defaults d = cmd->line.m.defaults;
   d.rtol = 1e-12;
-  int status = pw_cli_settings (&cmd->line, &d, &settings, &cmd->limit, error);
+  pw_cli_settings (&cmd->line, &d, &settings, &cmd->limit);
   cmd->settings.method = cmd->line.method ? cmd->line.method : "erk8+projection";
   cmd->settings.rtol = settings.rtol, cmd->settings.methods = settings.methods;
   cmd->vary.name = cmd->vary.unit = "";
   cmd->settings.stop = pw_limit_over, cmd->settings.stop_context = &cmd->limit;
-  if (status == PW_OK) status = periodic_read_period (cmd, error);
-  if (status != PW_OK || cmd->vary_text == NULL) return status;
+  if (periodic_read_period (cmd, error) != PW_OK || cmd->vary_text == NULL) return error->status;
   if (pw_vary_read (&cmd->vary, &cmd->line, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
   cmd->settings.compile = pw_vary_compile, cmd->settings.context = &cmd->vary;
@@ -519,15 +518,15 @@ static const struct poptOption periodic_options_table[] = {
   PW_OPTION_GROUP ("Periodic motions"),
   PW_TEXT_OPTION (pw_periodic_command, period_text, "period", 0, "T|free",
                   "Period [s] (default that of the signals); free: sought, if no signal changes with time"),
-  PW_TEXT_OPTION (pw_periodic_command, periods_text, "periods", 0, "N",
-                  "Repeat after N periods of the signals (default 1)"),
-  PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
-                  "First guess of a free period [s] (default: the time of the first return)"),
+  PW_NUMBER_OPTION (pw_periodic_command, periods, "periods", 0, "N", PW_COUNT,
+                    "Repeat after N periods of the signals (default 1)"),
+  PW_NUMBER_OPTION (pw_periodic_command, guess, "guess", 0, "T", PW_POSITIVE,
+                    "First guess of a free period [s] (default: the time of the first return)"),
   PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=LOW:HIGH", "Follow the motion over a parameter"),
   PW_RESULTS_OPTIONS ("Write the motion or branch as a table", "Write the results", "Draw a figure"),
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
   PW_METHOD_FILE_OPTION,
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
+  PW_NUMBER_OPTION (pw_cli_line, rtol, "rtol", 0, "R", PW_POSITIVE, "Relative tolerance (default 1e-12)"),
   PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

@@ -20,7 +20,7 @@ typedef struct {
   pw_cli_line line;
   const char **by; /* of --by, ended by NULL */
   const char **of; /* of --of, ended by NULL */
-  const char *every, *jobs_text;
+  pw_given every;
   pw_unknowns unknowns;   /* P of them */
   pw_run_outputs outputs; /* method NULL: the run itself; set by sensitivity_prepare for the runs that are compared */
   int jobs;               /* threads */
@@ -349,14 +349,13 @@ static int sensitivity_start (pw_unknowns *u, pw_error *error) {
 }
 
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
-  double every = 0;
+  double every = cmd->every.number;
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_engine (&cmd->unknowns, SENSITIVITY_RUNS, 1, error);
-  if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->jobs, error);
+  cmd->jobs = pw_parallel_jobs (&cmd->line);
   if (status == PW_OK)
-    status = pw_cli_requires ("--every", cmd->every, "-o FILE", cmd->line.table || cmd->line.plots, error);
-  if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &every, error);
+    status = pw_cli_requires ("--every", cmd->every.text, "-o FILE", cmd->line.table || cmd->line.plots, error);
   if (status != PW_OK) return status;
   if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
   if (cmd->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
@@ -364,7 +363,7 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   cmd->outputs.unknowns = &cmd->unknowns, cmd->outputs.option = "--of", cmd->outputs.of = cmd->of;
   while (cmd->of[cmd->outputs.count]) cmd->outputs.count++;
-  if (cmd->line.until && cmd->every)
+  if (cmd->line.until && cmd->every.text)
     return pw_fail (error, PW_INPUT, "--every cannot be given together with --until: there is no table");
   if ((cmd->line.table || cmd->line.plots) &&
       !cmd->line.until) { /* the table has rows from 0 to the end, whose times must not vary */
@@ -411,11 +410,11 @@ static const struct poptOption sensitivity_options[] = {
   PW_LIST_OPTION (sensitivity, of, "of", 0, "OUTPUT", "Differentiate " PW_OUTPUT_HELP "; repeatable"),
   PW_LIST_OPTION (sensitivity, by, "by", 0, "NAME",
                   "A parameter, or the initial value of a state, such as body.vx; repeatable"),
-  PW_TEXT_OPTION (sensitivity, every, "every", 0, "DT",
-                  "Time between rows of the table [s] (default a thousandth of the final time)"),
+  PW_NUMBER_OPTION (sensitivity, every, "every", 0, "DT", PW_POSITIVE,
+                    "Time between rows of the table [s] (default a thousandth of the final time)"),
   PW_RESULTS_OPTIONS ("Write outputs and derivatives along the run as a table", "Write the results",
                       "Draw a figure of the table"),
-  PW_TEXT_OPTION (sensitivity, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_JOBS_OPTION ("Number of concurrent runs (default: one per processor)"),
   PW_METHOD_OPTIONS,
   PW_UNTIL_OPTION,
   PW_MODEL_OPTIONS,

@@ -20,7 +20,8 @@ enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */
 
 typedef struct {
   pw_cli_line line;
-  const char **hold_texts, *vary_text, *starts_text, *at_text;
+  const char **hold_texts, *vary_text;
+  pw_given starts_given, at;
   pw_limit limit;
   pw_steady_settings settings;
   pw_initial_value hold[PW_HOLDS]; /* settings.holds values */
@@ -38,7 +39,7 @@ typedef struct {
   int stopped;        /* 1: by Ctrl-C or --limit */
 } pw_steady_command;
 
-#define STEADY_STARTS "30" /* default of --starts */
+#define STEADY_STARTS 30 /* default of --starts */
 
 /* Directions of pw_steady_follow: towards the first or the last value of the range. */
 enum { TO_FIRST = -1, TO_LAST = 1 };
@@ -66,19 +67,15 @@ static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
 }
 
 static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
-  double starts = 0;
-  int status = pw_cli_number ("--at", cmd->at_text, PW_NONNEGATIVE, &cmd->settings.t, error);
-  cmd->limit.seconds = INFINITY;
+  const double starts = pw_given_or (cmd->starts_given, STEADY_STARTS);
+  cmd->settings.t = cmd->at.number;
+  cmd->limit.seconds = pw_given_or (cmd->line.limit, INFINITY);
   cmd->settings.span = cmd->line.m.defaults.t_end;
   cmd->settings.vary = -1; /* none of the values held */
   cmd->settings.hold = cmd->hold;
-  if (status == PW_OK) status = pw_cli_number ("--limit", cmd->line.limit, PW_POSITIVE, &cmd->limit.seconds, error);
-  if (cmd->starts_text == NULL) cmd->starts_text = STEADY_STARTS;
-  if (status == PW_OK) status = pw_cli_number ("--starts", cmd->starts_text, PW_REAL, &starts, error);
-  if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
-    status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", cmd->starts_text);
-  if (status == PW_OK)
-    status = pw_hold_read (cmd->line.m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
+  if (!(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
+    return pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", cmd->starts_given.text);
+  int status = pw_hold_read (cmd->line.m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
   if (status == PW_OK && cmd->vary_text) status = steady_read_vary (cmd, error);
   cmd->random_attempts = (int)starts;
   return status;
@@ -607,9 +604,9 @@ static const struct poptOption steady_options_table[] = {
   PW_HOLD_OPTION (pw_steady_command, hold_texts),
   PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=LOW:HIGH",
                   "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
-  PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
-                  "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
-  PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
+  PW_NUMBER_OPTION (pw_steady_command, starts_given, "starts", 0, "N", PW_REAL,
+                    "Begin at the initial state and at N random ones (default 30)"),
+  PW_NUMBER_OPTION (pw_steady_command, at, "at", 0, "T", PW_NONNEGATIVE, "Evaluate signals at time T [s] (default 0)"),
   PW_RESULTS_OPTIONS ("Write the motions as a table", "Write the results", "With --vary, draw figures"),
   PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,

@@ -33,7 +33,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error) 
   pw_limit limit;
   *u = (pw_unknowns){ .line = line, .method = line->method ? line->method : line->m.defaults.method };
   int status = pw_method_parse (u->method, line->methods, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_cli_settings (line, &line->m.defaults, &u->settings, &limit, error);
+  pw_cli_settings (line, &line->m.defaults, &u->settings, &limit);
   if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;

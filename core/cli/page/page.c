@@ -92,7 +92,7 @@ static int page_choose_method (page *cmd, pw_error *error) {
   int options = strchr (wanted, ':') != NULL;
   if (options && cmd->line.method)
     return pw_fail (error, PW_INPUT, "--method %s: methods of pages have no options", wanted);
-  int kept = cmd->line.method || cmd->line.step || m->adaptive;
+  int kept = cmd->line.method || cmd->line.step.text || m->adaptive;
   if (available && !options)
     snprintf (cmd->method, sizeof cmd->method, "%s+%s", kept ? m->name : PAGE_INTEGRATOR,
               m->stabilisations[stabilisation].name);
@@ -155,7 +155,7 @@ static int page_open (page *cmd, pw_error *error) {
   }
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, use, 2, error);
-  if (status == PW_OK) status = pw_cli_settings (&cmd->line, &cmd->line.m.defaults, &cmd->settings, &cmd->limit, error);
+  if (status == PW_OK) pw_cli_settings (&cmd->line, &cmd->line.m.defaults, &cmd->settings, &cmd->limit);
   if (status == PW_OK) status = page_choose_method (cmd, error);
   if (status == PW_OK) status = page_check_presets (cmd, error);
   if (status == PW_OK) status = pw_page_open (&cmd->content, cmd->line.m.file, error);
@@ -187,9 +187,9 @@ static const struct poptOption page_options[] = {
   PW_MODEL_OPTIONS,
   PW_OPTION_GROUP ("Integration"),
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", PAGE_METHODS ", with a stabilisation"),
-  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
-  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of methods with fixed steps [s]"),
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of the others"),
+  PW_NUMBER_OPTION (pw_cli_line, t_end, "t-end", 't', "T", PW_POSITIVE, "Final time [s]"),
+  PW_NUMBER_OPTION (pw_cli_line, step, "step", 0, "H", PW_POSITIVE, "Step size of methods with fixed steps [s]"),
+  PW_NUMBER_OPTION (pw_cli_line, rtol, "rtol", 0, "R", PW_POSITIVE, "Relative tolerance of the others"),
   POPT_TABLEEND
 };
 

@@ -162,7 +162,7 @@ static int check_limits (pw_check *check, pw_error *error) {
   pw_limit seconds;
   pw_error own = { 0 };
   int status = pw_outcomes_open (&set, s, "check", text, CHECK_LIMIT_OUTPUTS * check->limits, NULL, error);
-  if (status == PW_OK) status = pw_cli_settings (&check->line, &check->line.m.defaults, &settings, &seconds, error);
+  pw_cli_settings (&check->line, &check->line.m.defaults, &settings, &seconds);
   seconds.seconds = CHECK_LIMIT_SECONDS;
   pw_limit_start (&seconds);
   if (status == PW_OK && pw_outcomes_run (&set, method, &settings, settings.span, NULL, &own) != PW_OK)

@@ -31,7 +31,8 @@ typedef struct {
   pw_study study;
   int table;     /* 1: --table */
   int concludes; /* 1: a conclusion is printed, since errors of coordinates are known */
-  const char *rtol_text, *step_text, *repeats_text;
+  const char *rtol_text, *step_text;
+  pw_given repeats_given;
   double finest_step; /* of --step-ladder [s] */
   double repeats;     /* timed runs of a row, at most */
   pw_reference reference;
@@ -268,7 +269,7 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
  * table unless --t-end is given.  Close the motion of the reference in every case. */
 static int reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   const char *path = study->reference_path;
-  double t_end = path && study->line.t_end == NULL ? 0 : study->settings.span; /* 0: that of the table */
+  double t_end = path && study->line.t_end.text == NULL ? 0 : study->settings.span; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
   if (path == NULL && (study->line.starts || !pw_model_has_reference (study->line.m.model)))
     return reference_compute (reference, study, step, error);
@@ -599,15 +600,12 @@ static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], 
 static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
-  study->settings.span = study->line.m.defaults.t_end;
-  study->cpu_limit = 10;
-  compare->repeats = 9;
-  int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->settings.span, error);
-  if (status == PW_OK) status = pw_cli_number ("--limit", study->line.limit, PW_POSITIVE, &study->cpu_limit, error);
-  if (status == PW_OK) status = pw_cli_number ("--repeats", compare->repeats_text, PW_COUNT, &compare->repeats, error);
-  if (status == PW_OK && compare->repeats > COMPARE_REPEATS)
-    return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", compare->repeats_text, COMPARE_REPEATS);
-  if (status == PW_OK) status = pw_study_read_methods (study, compare_default_methods, error);
+  study->settings.span = pw_given_or (study->line.t_end, study->line.m.defaults.t_end);
+  study->cpu_limit = pw_given_or (study->line.limit, 10);
+  compare->repeats = pw_given_or (compare->repeats_given, 9);
+  if (compare->repeats > COMPARE_REPEATS)
+    return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", compare->repeats_given.text, COMPARE_REPEATS);
+  int status = pw_study_read_methods (study, compare_default_methods, error);
   if (status == PW_OK) status = compare_read_ladder ("--step-ladder", compare->step_text, &ladders[0], error);
   if (status == PW_OK) status = compare_read_ladder ("--rtol-ladder", compare->rtol_text, &ladders[1], error);
   study->limit.seconds = study->cpu_limit;
@@ -660,7 +658,7 @@ static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *er
     sum += cpu[n++] = row->cpu;
     gsl_sort (cpu, 1, (size_t)n);
     const int agree = cpu[n - 1] - cpu[0] <= COMPARE_QUIET * cpu[0], is_long = sum > COMPARE_ENOUGH;
-    if (compare->repeats_text) continue;
+    if (compare->repeats_given.text) continue;
     if ((n >= COMPARE_FEW && (agree || is_long)) || (n >= COMPARE_FEWEST && agree && is_long)) break;
   }
   row->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
@@ -726,7 +724,7 @@ static int compare_begin (pw_study *study, pw_error *error) {
   int status = reference_find (&compare->reference, study, compare->finest_step, error);
   if (status == PW_OK && study->folder) status = reference_write (&compare->reference, study->folder, error);
   if (status != PW_OK) return status;
-  if (study->line.limit == NULL && compare->reference.cpu > 0)
+  if (study->line.limit.text == NULL && compare->reference.cpu > 0)
     study->cpu_limit = fmin (study->cpu_limit, fmax (COMPARE_ENOUGH, COMPARE_HOPELESS * compare->reference.cpu));
   study->limit.seconds = study->cpu_limit;
   study->run_share = 1 / (compare->repeats + 1);
@@ -815,17 +813,16 @@ static const struct poptOption compare_options[] = {
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),
   PW_TEXT_OPTION (pw_compare, step_text, "step-ladder", 0, "FROM:TO",
                   "Step sizes of fixed-step methods [s], halved each time (default 0.1:1e-4)"),
-  PW_TEXT_OPTION (
-      pw_cli_line, limit, "limit", 0, "SECONDS",
+  PW_NUMBER_OPTION (
+      pw_cli_line, limit, "limit", 0, "SECONDS", PW_POSITIVE,
       "Processor time of a single run; runs expected to take longer are skipped (default 10, at most 100 times "
       "that of a computed reference)"),
-  PW_TEXT_OPTION (
-      pw_compare, repeats_text, "repeats", 0, "N",
+  PW_NUMBER_OPTION (
+      pw_compare, repeats_given, "repeats", 0, "N", PW_COUNT,
       "Timed repetitions of each run, at most 99, of which the median is reported (default: 3 that agree to 5 %, "
       "else up to 9 within a tenth of a second; 2 of long runs)"),
-  PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N",
-                  "Number of methods that run at a time, each on a physical core of its own (default: all cores)"),
-  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
+  PW_JOBS_OPTION ("Number of methods that run at a time, each on a physical core of its own (default: all cores)"),
+  PW_NUMBER_OPTION (pw_cli_line, t_end, "t-end", 't', "T", PW_POSITIVE, "Final time [s]"),
   PW_ENGINE_OPTION,
   PW_TEXT_OPTION (
       pw_study, reference_path, "reference", 0, "FILE.csv",

@@ -145,9 +145,9 @@ static int drift_plan (pw_study *study, pw_error *error) {
   pw_drift *drift = (pw_drift *)study;
   pw_run_defaults defaults = study->line.m.defaults;
   if (defaults.rtol == 0) defaults.rtol = PW_RTOL;
-  int status = pw_cli_settings (&study->line, &defaults, &study->settings, &study->limit, error);
+  pw_cli_settings (&study->line, &defaults, &study->settings, &study->limit);
   study->settings.ledger = 1;
-  if (status == PW_OK) status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
+  int status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
   for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++)
     status = drift_read_values (drift, drift_default_values[i], error);
   if (status == PW_OK && drift->only_methods && drift->vary)
@@ -288,7 +288,7 @@ static const struct poptOption drift_options[] = {
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",
       "Values of an option: alpha and beta [1/s] of baumgarte, in all pairs (default 1 to 1000), every [steps] of "
       "projection, in both metrics (default 1 to 100); repeatable. RANGE: V1,V2,... or LOW:HIGH[:COUNT][:log]"),
-  PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_JOBS_OPTION ("Number of concurrent runs (default: one per processor)"),
   PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
   PW_TEXT_OPTION (pw_study, table_path, "output", 'o', "FILE.csv", "Write the table of all runs"),
   PW_TEXT_OPTION (pw_study, folder, "plots", 0, "DIR", "Write tables and figures into a folder"),

@@ -15,7 +15,8 @@
 
 typedef struct {
   /* as given, or NULL; without --checkpoint, `path` is that of --resume */
-  const char *path, *interval_text, *resume_path;
+  const char *path, *resume_path;
+  pw_given interval_given;
   /* as understood */
   double interval;       /* simulated time between two checkpoints [s]; 0: there are none */
   double next_time;      /* of the next checkpoint [s]; INFINITY: never */
@@ -58,7 +59,7 @@ enum { PW_RUN_TABLE, PW_RUN_PAGE, PW_RUN_SUMMARY, PW_RUN_OUTPUTS };
 typedef struct pw_run_cli {
   /* as given */
   pw_cli_line line;
-  const char *row_interval_text; /* --every */
+  pw_given every;
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
   const char **of;               /* ended by NULL; or NULL */
   int with_energies, with_error; /* 1: --energy, --error */
@@ -527,10 +528,10 @@ static int checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_
   pw_checkpoints *checkpoints = &command->checkpoints;
   checkpoints->next_time = INFINITY;
   if (checkpoints->path == NULL) checkpoints->path = checkpoints->resume_path;
-  if (checkpoints->path == NULL && checkpoints->interval_text == NULL) return PW_OK;
+  if (checkpoints->path == NULL && checkpoints->interval_given.text == NULL) return PW_OK;
   if (checkpoints->path == NULL)
     return pw_fail (error, PW_INPUT, "--checkpoint-every %s: --checkpoint FILE is needed to save to",
-                    checkpoints->interval_text);
+                    checkpoints->interval_given.text);
   checkpoints->interval = command->settings.span / 10;
   if (checkpoints->resume_path) {
     if (pw_checkpoint_read (checkpoints->resume_path, &checkpoints->resumed, error) != PW_OK) return error->status;
@@ -539,7 +540,8 @@ static int checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_
     if (interval) checkpoints->interval = fmax (strtod (interval, NULL), 0);
     if (*specialise == PW_SPECIALISE_AUTO) *specialise = engine ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
   }
-  return pw_cli_number ("--checkpoint-every", checkpoints->interval_text, PW_POSITIVE, &checkpoints->interval, error);
+  checkpoints->interval = pw_given_or (checkpoints->interval_given, checkpoints->interval);
+  return PW_OK;
 }
 
 /* Everything that determines the results. */
@@ -698,7 +700,7 @@ static int run_open_outputs (pw_run_cli *command, pw_error *error) {
     return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
                     command->table_path);
   int has_plots = command->plots_path != NULL;
-  int status = pw_cli_requires ("--every", command->row_interval_text, "-o FILE", command->table_path != NULL, error);
+  int status = pw_cli_requires ("--every", command->every.text, "-o FILE", command->table_path != NULL, error);
   if (status == PW_OK) status = pw_cli_requires ("--width", command->line.width, "--plots DIR", has_plots, error);
   if (status == PW_OK) status = pw_cli_requires ("--colour", command->colour, "--plots DIR", has_plots, error);
   if (status == PW_OK && command->page_path) status = pw_animation_check ("--animate", command->page_path, error);
@@ -720,16 +722,15 @@ static int run_read_settings (pw_run_cli *command, pw_error *error) {
   const pw_method *method;
   pw_specialise when;
   pw_error reason = { 0 };
-  int status = pw_cli_settings (&command->line, defaults, &command->settings, &command->limit, error);
-  if (status == PW_OK)
-    status = pw_cli_number ("--every", command->row_interval_text, PW_POSITIVE, &command->row_interval, error);
+  pw_cli_settings (&command->line, defaults, &command->settings, &command->limit);
+  command->row_interval = command->every.number;
   command->method = command->line.method ? command->line.method : defaults->method;
-  if (status == PW_OK && command->line.method == NULL &&
+  if (command->line.method == NULL &&
       pw_method_parse (command->method, command->line.methods, &method, NULL, &reason) != PW_OK)
     return pw_fail (error, reason.status, "model %s: its default method: %s", pw_file_name (command->line.m.file),
                     reason.text);
   command->settings.ledger = command->with_energies || command->plots_path || command->page_path;
-  if (status == PW_OK) status = pw_cli_read_specialise (command->line.specialise, &when, error);
+  int status = pw_cli_read_specialise (command->line.specialise, &when, error);
   if (status == PW_OK) status = checkpoints_open (command, &when, error);
   if (status != PW_OK) return status;
   pw_cli_engine_open (&command->engine, command->line.m.system, when,
@@ -1030,8 +1031,8 @@ static const struct poptOption run_options[] = {
   PW_OPTION_GROUP ("Output"),
   PW_TEXT_OPTION (pw_run_cli, table_path, "output", 'o', "FILE.csv",
                   "Write a table of samples, FILE.npz for NumPy; - is standard output"),
-  PW_TEXT_OPTION (pw_run_cli, row_interval_text, "every", 0, "DT",
-                  "Time between rows of the table [s] (default: a row per step)"),
+  PW_NUMBER_OPTION (pw_run_cli, every, "every", 0, "DT", PW_POSITIVE,
+                    "Time between rows of the table [s] (default: a row per step)"),
   PW_TEXT_OPTION (pw_run_cli, summary_path, "json", 0, "FILE", "Write a summary as JSON; - is standard output"),
   PW_TEXT_OPTION (pw_run_cli, plots_path, "plots", 0, "DIR", "Draw figures into a folder"),
   PW_WIDTH_OPTION,
@@ -1049,8 +1050,8 @@ static const struct poptOption run_options[] = {
   PW_OPTION_GROUP ("Checkpoints"),
   PW_TEXT_OPTION (pw_run_cli, checkpoints.path, "checkpoint", 0, "FILE",
                   "Save the state regularly, so that the run can be resumed"),
-  PW_TEXT_OPTION (pw_run_cli, checkpoints.interval_text, "checkpoint-every", 0, "T",
-                  "Simulated time between checkpoints [s] (default: a tenth of the run)"),
+  PW_NUMBER_OPTION (pw_run_cli, checkpoints.interval_given, "checkpoint-every", 0, "T", PW_POSITIVE,
+                    "Simulated time between checkpoints [s] (default: a tenth of the run)"),
   PW_TEXT_OPTION (pw_run_cli, checkpoints.resume_path, "resume", 0, "FILE",
                   "Continue from a checkpoint of the same command, and save further ones to it"),
   PW_MODEL_OPTIONS,

@@ -305,7 +305,7 @@ static int study_open (pw_study *study, pw_error *error) {
   study->cpu_limit = INFINITY;
   pthread_mutex_init (&study->mutex, NULL);
   int status = pw_cli_open (&study->line, error);
-  if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
+  study->jobs = pw_parallel_jobs (&study->line);
   if (status == PW_OK) status = study->type->plan (study, error);
   if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
   if (status == PW_OK) status = pw_report_initial_state (&study->line.m, study->limit.seconds, error);

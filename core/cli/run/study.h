@@ -89,7 +89,7 @@ typedef struct {
 struct pw_study {
   /* as given */
   pw_cli_line line;
-  const char *methods_text, *reference_path, *folder, *table_path, *jobs_text; /* folder: --plots */
+  const char *methods_text, *reference_path, *folder, *table_path; /* folder: --plots */
   /* as understood */
   const pw_study_type *type;
   pw_cli_engine engine; /* of all runs */

@@ -1143,7 +1143,7 @@ static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_
 typedef struct {
   /* as given */
   pw_cli_line line;
-  const char *part_text, *jobs_text, *lanes_text;
+  const char *part_text, *lanes_text;
   const char **ranges; /* --vary */
   int merge;           /* 1: --merge */
   /* as understood */
@@ -1190,14 +1190,13 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   if (plan->with_error && row_has_outcomes (plan))
     return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --%s",
                     plan->of ? "of" : "until");
-  int status = pw_cli_settings (&sweep->line, defaults, &plan->settings, &plan->limit, error);
-  if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
-  if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
-  if (status != PW_OK) return status;
+  pw_cli_settings (&sweep->line, defaults, &plan->settings, &plan->limit);
+  pw_cli_report_unused (plan->method, &sweep->line);
+  if (pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error) != PW_OK) return error->status;
   plan->lanes = lanes ? *lanes - '0' : 0;
   if (lanes && (plan->lanes < 1 || plan->lanes > PW_LANES_MOST || (plan->lanes & (plan->lanes - 1)) != 0 || lanes[1]))
     return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, lanes);
-  if (pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error) != PW_OK) return error->status;
+  sweep->jobs = pw_parallel_jobs (&sweep->line);
   plan->part = plan->parts = 1; /* without --part the sweep is its only part */
   if (sweep->part_text == NULL || (sscanf (sweep->part_text, "%7d/%7d%c", &plan->part, &plan->parts, &rest) == 2 &&
                                    1 <= plan->part && plan->part <= plan->parts && plan->parts <= 1000000))
@@ -1385,7 +1384,7 @@ static const struct poptOption sweep_options[] = {
   PW_LIST_OPTION (pw_sweep, plan.of, "of", 0, "OUTPUT", "Add a column: " PW_OUTPUT_HELP "; repeatable"),
   PW_RESULTS_OPTIONS ("Write the table", "Write a summary",
                       "Draw the outputs, or the states, as curves over one varied quantity or as maps over two,"),
-  PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
+  PW_JOBS_OPTION ("Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",
                   "Runs that a thread advances at once, " SWEEP_LANES ", with steps of fixed size and specialised code "
                   "(default: as many as are worthwhile)"),
