@@ -44,8 +44,8 @@ int pw_limit_over (void *context);
 /* Why a run returned PW_STOPPED at time t: PW_RETRY, without an error, if pw_stop is set (after a signal the command
  * returns PW_INTERRUPTED); else PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
-/* Opens a run whose settings.stop is pw_limit_over; the clock must have been started.  If the run is stopped then, the
- * error is that of pw_limit_status, without a text if that is PW_RETRY. */
+/* Starts the clock, and opens a run whose settings.stop is pw_limit_over.  If the run is stopped then, the error is that
+ * of pw_limit_status, without a text if that is PW_RETRY. */
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* The time of a clock [s]. */

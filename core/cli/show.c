@@ -424,7 +424,6 @@ static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
   pw_limit limit;
   if (t > 0) defaults.t_end = t;
   pw_cli_settings (line, &defaults, &settings, &limit);
-  pw_limit_start (&limit);
   pw_run *run = pw_limit_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
   pw_sample sample;

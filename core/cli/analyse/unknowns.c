@@ -127,7 +127,6 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
   to->settings.stop = pw_limit_over;
   to->settings.stop_context = &to->limit;
   to->settings.specialised = code && pw_specialised_fits (code, to->m.system) ? code : NULL;
-  pw_limit_start (&to->limit);
   return PW_OK;
 }
 
@@ -146,9 +145,8 @@ void pw_unknown_run_close (pw_unknown_run *run) {
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   char text[PW_CHANGE_TEXT];
   pw_unknown_run r;
-  if (pw_unknown_run_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
-    r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
-  if (r.run && pw_cli_largest_change (r.run, r.m.system, text) > 0)
+  if (pw_unknown_run_open (&r, u, x, &(pw_error){ 0 }) == PW_OK &&
+      pw_cli_largest_change (r.run, r.m.system, text) > 0)
     pw_cli_say ("pinwheel: given initial values of this result were changed to satisfy the constraints, at worst %s\n",
                 text);
   pw_unknown_run_close (&r);

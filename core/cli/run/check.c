@@ -164,7 +164,6 @@ static int check_limits (pw_check *check, pw_error *error) {
   int status = pw_outcomes_open (&set, s, "check", text, CHECK_LIMIT_OUTPUTS * check->limits, NULL, error);
   pw_cli_settings (&check->line, &check->line.m.defaults, &settings, &seconds);
   seconds.seconds = CHECK_LIMIT_SECONDS;
-  pw_limit_start (&seconds);
   if (status == PW_OK && pw_outcomes_run (&set, method, &settings, settings.span, NULL, &own) != PW_OK)
     check_add (&check->finding, "what the run uses of the limits of reactions is not known: %s", own.text);
   for (int i = 0; status == PW_OK && own.status == PW_OK && i < check->limits; i++) {

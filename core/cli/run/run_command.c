@@ -771,7 +771,6 @@ static int run_open (pw_run_cli *command, pw_error *error) {
     status = pw_outcomes_open (&command->outcomes, system, "--of", command->of, outputs, command->line.until, error);
   if (status != PW_OK) return status;
   if (follows) pw_outcomes_settings (&command->outcomes, &command->settings);
-  pw_limit_start (&command->limit);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
   command->redundant = pw_report_redundancies (command->run);

@@ -957,7 +957,6 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
           (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
                               grid_value (&plan->grid, i, row->number) };
   settings.initial = initial;
-  pw_limit_start (&row->limit);
   if (initial == NULL) pw_fail (&row->error, PW_RESOURCE, "out of memory");
   if (initial && row_has_outcomes (plan) &&
       pw_outcomes_open (&row->of, row->system->model.system, "--of", plan->of, plan->outputs, plan->line->until,
