@@ -44,8 +44,8 @@ int pw_limit_over (void *context);
 /* Why a run returned PW_STOPPED at time t: PW_RETRY, without an error, if pw_stop is set (after a signal the command
  * returns PW_INTERRUPTED); else PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
-/* Starts the clock, and opens a run whose settings.stop is pw_limit_over.  If the run is stopped then, the error is that
- * of pw_limit_status, without a text if that is PW_RETRY. */
+/* Starts the clock, and opens a run whose settings.stop is pw_limit_over.  If the run is stopped then, the error is
+ * that of pw_limit_status, without a text if that is PW_RETRY. */
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* The time of a clock [s]. */
@@ -163,9 +163,10 @@ typedef struct {
 #define PW_COMMAND(name) extern const pw_command pw_cli_##name;
 PW_COMMANDS (PW_COMMAND)
 
-/* Entries of a table of options: a text, a number of a domain (a pw_given), a list of texts (the option may be repeated), a flag (an int).  The member
- * of the structure `type` is zero if the option is not given; texts are released with the command line.  `name`:
- * "every"; `letter`: 'e', or 0 without a short form; `value`: its name in the help, "DT". */
+/* Entries of a table of options: a text, a number of a domain (a pw_given), a list of texts (the option may be
+ * repeated), a flag (an int).  The member of the structure `type` is zero if the option is not given; texts are
+ * released with the command line.  `name`: "every"; `letter`: 'e', or 0 without a short form; `value`: its name in the
+ * help, "DT". */
 #define PW_TEXT_OPTION(type, member, name, letter, value, help) \
   { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 0, help, value }
 #define PW_NUMBER_OPTION(type, member, name, letter, value, domain, help) \

@@ -145,8 +145,7 @@ void pw_unknown_run_close (pw_unknown_run *run) {
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   char text[PW_CHANGE_TEXT];
   pw_unknown_run r;
-  if (pw_unknown_run_open (&r, u, x, &(pw_error){ 0 }) == PW_OK &&
-      pw_cli_largest_change (r.run, r.m.system, text) > 0)
+  if (pw_unknown_run_open (&r, u, x, &(pw_error){ 0 }) == PW_OK && pw_cli_largest_change (r.run, r.m.system, text) > 0)
     pw_cli_say ("pinwheel: given initial values of this result were changed to satisfy the constraints, at worst %s\n",
                 text);
   pw_unknown_run_close (&r);

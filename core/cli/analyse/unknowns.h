@@ -50,7 +50,8 @@ typedef struct {
   pw_limit limit; /* set by pw_unknown_run_prepare */
   pw_run *run;
 } pw_unknown_run;
-/* Compiles the model and sets m and settings, with the engine and a limit of its own; the caller opens `run`.  *to must not move, since settings points to its limit.  Close it in every case. */
+/* Compiles the model and sets m and settings, with the engine and a limit of its own; the caller opens `run`.  *to must
+ * not move, since settings points to its limit.  Close it in every case. */
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 /* The same, and opens the run. */
 int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
