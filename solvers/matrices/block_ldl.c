@@ -20,11 +20,8 @@
 #pragma GCC optimize("no-tree-slp-vectorize")
 #endif
 
-/* ---- Operations on blocks of up to 2 x 2 and on rows of a body's columns ----
- *
- * Sizes are constants where these functions are inlined; kj is the size of column j, and so on. */
-
-/* Calls f with a constant in place of a size that is 1 or 2, or of a width that is 1 or 3. */
+/* Calls f with a constant in place of a size that is 1 or 2, or of a width that is 1 or 3; below, kj is the size of
+ * column j, and so on. */
 #define BLOCK_SIZE(size, f, ...) ((size) == 2 ? f (2, __VA_ARGS__) : f (1, __VA_ARGS__))
 #define BLOCK_WIDTH(width, f, ...) ((width) == 3 ? f (3, __VA_ARGS__) : f (1, __VA_ARGS__))
 
@@ -66,11 +63,9 @@ static inline double block_dot (int kj, double x, double y, const double *A) {
   return kj == 2 ? x * A[0] + y * A[1] : x * A[0];
 }
 
-/* ---- Chains ----
- *
- * Each elimination waits for the one before it.  A chain that can be eliminated from both ends (includes_last) is
- * therefore swept in the two lanes of vector registers, from the ends to the middle; in any other chain both lanes do
- * the same, from the first pin to the last. */
+/* Chains.  Each elimination waits for the one before it.  A chain that can be eliminated from both ends (includes_last)
+ * is therefore swept in the two lanes of vector registers, from the ends to the middle; in any other chain both lanes
+ * do the same, from the first pin to the last. */
 
 enum { CHAIN_BLOCK = 5 }; /* values of a diagonal block of 2 unknowns */
 
@@ -165,7 +160,6 @@ PW_INLINE void chain_store_unknowns (const chain_sweep *s, double *y, chain_pair
   chain_store (first, second, 1, value.y);
 }
 
-/* The forces on the bodies. */
 PW_INLINE chain_vector chain_forces (const chain_sweep *s, const double *f) {
   const double *first = f + s->j[0], *second = f + s->j[1];
   return (chain_vector){ chain_load (first, second, 0), chain_load (first, second, 1), chain_load (first, second, 2) };
@@ -340,8 +334,6 @@ PW_SELDOM void chain_backward (const pw_block_ldl *l, const pw_chain *c, const d
   for (int n = pairs; n > 0; n--) at = chain_backward_body (l, &ends, -1, f, y, a, at);
 }
 
-/* ---- Assembly ---- */
-
 /* K += B R^T, kb x ka, with B = J_b, whose rows are `stride` apart, and R = J_a W^-1. */
 PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B, int stride) {
   K[0] += block_product (width, R[0], B);
@@ -407,8 +399,6 @@ static void block_assemble (const pw_block_ldl *l) {
       for (; a < end; coupling += end - ++a) BLOCK_SIZE (a->size, block_contribute, 1, l, p, a, coupling);
   }
 }
-
-/* ---- Elimination ---- */
 
 typedef struct {
   double xx, xy, yx, yy;
@@ -506,9 +496,7 @@ void pw_block_factor (pw_block_ldl *l) {
     }
 }
 
-/* ---- Solution ----
- *
- * Of an uncondensed body k, y_k begins as -f_k and becomes -a_k.
+/* Solution.  Of an uncondensed body k, y_k begins as -f_k and becomes -a_k.
  *
  *   for each body:                y_p -= J_p W^-1 f
  *   for each column j:            y_p -= L_pj y_j
@@ -586,28 +574,17 @@ PW_INLINE void block_backward_column (int kj, const pw_block_ldl *l, const pw_bl
   if (kj == 2) to[1] = sum[1];
 }
 
-static void block_right (const pw_block_ldl *l, const double *f, double *y) {
-  for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++)
+void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a) {
+  const pw_chain *chain = l->chain;
+  const pw_block_column *c = l->column;
+  const pw_group_block *p, *last = l->group + l->groups;
+  for (p = l->group; f && p < last; p++)
     if (p->uncondensed)
       for (int n = 0; n < 3; n++)
         y[l->contribution[p[1].first_contribution - 2].unknown + n] -=
             l->inverse_weight[p->j + n] > 0 ? f[p->j + n] : 0;
     else
       BLOCK_WIDTH (p->width, block_right_of, l, p, f, y);
-}
-
-static void block_accelerations (const pw_block_ldl *l, const double *f, const double *y, double *a) {
-  for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++)
-    if (p->uncondensed)
-      for (int n = 0; n < 3; n++) a[p->j + n] = -y[l->contribution[p[1].first_contribution - 2].unknown + n];
-    else
-      BLOCK_WIDTH (p->width, block_accelerate, l, p, f, y, a);
-}
-
-void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a) {
-  const pw_chain *chain = l->chain;
-  const pw_block_column *c = l->column;
-  if (f) block_right (l, f, y);
   for (int j = 0; j < l->nodes;)
     if (chain->first_column == j) {
       chain_forward (l, chain, f, y);
@@ -625,10 +602,12 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
       j--;
       BLOCK_SIZE (c[j].size, block_backward_column, l, c + j, y);
     }
-  block_accelerations (l, f, y, a);
+  for (p = l->group; p < last; p++)
+    if (p->uncondensed)
+      for (int n = 0; n < 3; n++) a[p->j + n] = -y[l->contribution[p[1].first_contribution - 2].unknown + n];
+    else
+      BLOCK_WIDTH (p->width, block_accelerate, l, p, f, y, a);
 }
-
-/* ---- Elimination order ---- */
 
 typedef struct {
   int nodes;
@@ -687,8 +666,6 @@ static int order_pass (const order_search *x, int most, int *below) {
   }
   return count <= most ? PW_OK : PW_RETRY;
 }
-
-/* ---- Chains ---- */
 
 /* Appends the body of link, after that of last, if it continues the chain at the same strides; returns whether it
  * does. */
@@ -798,8 +775,6 @@ static pw_block_ldl *order_choose (order_search *x) {
   return natural;
 }
 
-/* ---- Layout ---- */
-
 int pw_block_find (const pw_block_ldl *l, int a, int b) {
   const int row = l->column_of_node[a], column = l->column_of_node[b];
   if (row < column) return pw_block_find (l, b, a);
@@ -807,21 +782,6 @@ int pw_block_find (const pw_block_ldl *l, int a, int b) {
   int at = c->first_value + pw_block_diagonal_values (c->size);
   for (int i = c->first_below; l->below[i] != row; i++) at += c->size * l->column[l->below[i]].size;
   return at;
-}
-
-/* Assigns each column its first value.  PW_OK, or PW_RESOURCE if there are too many values. */
-static int order_place_columns (pw_block_ldl *l) {
-  size_t at = 0;
-  for (int j = 0; j < l->nodes; j++) {
-    pw_block_column *c = &l->column[j];
-    c->first_value = (int)at;
-    if (c->in_chain) continue;
-    at += (size_t)pw_block_diagonal_values (c->size);
-    for (int i = c->first_below; i < c[1].first_below; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
-    if (at > INT_MAX) return PW_RESOURCE;
-  }
-  l->column[l->nodes].first_value = l->values = (int)at;
-  return PW_OK;
 }
 
 /* For each column, for its q-th row below: walks once down the column of that row, where the targets of the rows p > q
@@ -847,15 +807,20 @@ static void order_place_targets (pw_block_ldl *l) {
 }
 
 int pw_block_lay_out (pw_block_ldl *l) {
-  size_t targets = 0, longest = 0;
-  if (order_place_columns (l) != PW_OK) return PW_RESOURCE;
-  for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
+  size_t at = 0, targets = 0, longest = 0;
+  for (pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
     size_t rows = (size_t)(c[1].first_below - c->first_below);
+    c->first_value = (int)at;
+    if (!c->in_chain) at += (size_t)pw_block_diagonal_values (c->size);
+    for (int i = c->first_below; i < c[1].first_below && !c->in_chain; i++)
+      at += (size_t)(c->size * l->column[l->below[i]].size);
+    if (at > INT_MAX) return PW_RESOURCE;
     if (rows <= PW_BLOCK_LISTED)
       targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
     else if (rows > longest)
       longest = rows;
   }
+  l->column[l->nodes].first_value = l->values = (int)at;
   l->cursor = malloc ((2 * longest + 1) * sizeof *l->cursor);
   l->target = malloc ((targets + 1) * sizeof *l->target);
   l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);

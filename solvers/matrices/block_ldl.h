@@ -107,8 +107,6 @@ typedef struct pw_block_ldl {
   char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
 } pw_block_ldl;
 
-/* ---- Planning ---- */
-
 typedef struct {
   int size;               /* unknowns */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
@@ -140,8 +138,6 @@ int pw_block_find (const pw_block_ldl *l, int a, int b);
 static inline int pw_block_diagonal_values (int size) {
   return size * (size + 3) / 2;
 }
-
-/* ---- Factorisation and solution ---- */
 
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);

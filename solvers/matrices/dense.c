@@ -16,8 +16,6 @@
 #pragma GCC optimize("no-tree-slp-vectorize")
 #endif
 
-/* ---- Bodies ---- */
-
 /* f of a group less the forces of its known rows; a becomes that. */
 PW_INLINE void dense_take_known (int width, int rows, const pw_dense_group *p, const double *f, double *a, double *F) {
   PW_UNROLL for (int k = 0; k < width; k++) F[k] = f[p->j + k];
@@ -99,8 +97,6 @@ PW_INLINE void dense_accelerate (int pins, int others, int known, const pw_dense
 
 DENSE_BODIES (DENSE_BODY)
 
-/* ---- Any group ---- */
-
 /* S NULL: y alone. */
 PW_INLINE void dense_add_width (int width, const pw_dense_group *p, const double *w, const double *f, double *S,
                                 double *y, double *a) {
@@ -145,8 +141,6 @@ static void dense_accelerate_any (const pw_dense_group *p, const double *w, cons
   else
     dense_accelerate_width (1, p, w, f, y, a);
 }
-
-/* ---- S ---- */
 
 /* L and D of S */
 PW_INLINE void dense_factor (int n, pw_dense *d, const double *S) {
@@ -205,8 +199,6 @@ DENSE_RUN (4)
 DENSE_RUN (6)
 DENSE_RUN (8)
 DENSE_RUN (10)
-
-/* ---- Opening ---- */
 
 pw_dense *pw_dense_new (int groups, int known, int coords, const double *inverse_weight) {
   pw_dense *d = calloc (1, sizeof *d + (size_t)groups * sizeof *d->group);

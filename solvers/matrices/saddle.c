@@ -147,8 +147,6 @@ typedef struct {
   pw_arena arena;           /* contains the arrays whose length is known beforehand */
 } saddle_plan;
 
-/* ---- Massless coordinates: matching ---- */
-
 static const double massless_zeros[3] = { 0 };
 
 /* Copies J of row i to A. */
@@ -187,12 +185,6 @@ static void massless_swap (pw_component *c, int a, int b) {
 
 /* Entries below this, relative to the terms or the largest entry of their row, are what round-off leaves of 0. */
 #define MASSLESS_ROUND_OFF 1e-12
-
-/* 1 if an entry of row i of Z' is larger than what round-off leaves of its terms; column: local. */
-static int massless_is_entry (const pw_component *c, int i, int column) {
-  return fabs (c->A[i * c->cols + column]) * sqrt (c->squared_scale[column]) >
-         MASSLESS_ROUND_OFF * sqrt (c->row[i].squared_terms);
-}
 
 /* Matches the row with the largest entry in a massless column, each row scaled by its largest original entry (so that
  * the remainder of a dependent row is small), and moves it to p.  Returns 0 if all entries are round-off; the component
@@ -276,13 +268,10 @@ static int massless_match (pw_component *c) {
   return c->pivots;
 }
 
-/* ---- Massless coordinates: elimination ----
- *
- * n is c->pivots: an argument, since it is the constant 1, 2 or 3 in most calls, so that loops are unrolled. */
-
 enum { MASSLESS_LOCAL = 3 };
 
-/* Calls f (n, c, ...), with the constant 1, 2 or 3, or f_any (c, ...), a function that is not inlined. */
+/* Calls f (n, c, ...), where n is c->pivots, with the constant 1, 2 or 3, so that loops are unrolled, or f_any (c,
+ * ...), a function that is not inlined. */
 #define MASSLESS_PIVOTS(f, ...)          \
   (c->pivots == 3   ? f (3, __VA_ARGS__) \
    : c->pivots == 2 ? f (2, __VA_ARGS__) \
@@ -437,9 +426,7 @@ PW_INLINE void massless_backward (pw_saddle *saddle, int dense, double *a, doubl
     MASSLESS_PIVOTS (massless_backward_component, c, dense, a, lambda);
 }
 
-/* ---- Components, by union-find over the groups that contain massless coordinates, here called massless groups ---- */
-
-/* 1 if a group contains a massless coordinate. */
+/* 1 for a massless group: one that contains a massless coordinate.  Union-find over these finds the components. */
 static int massless_is_group (const saddle_plan *p, int group) {
   int j = group_first (p->saddle->s, group);
   for (int n = 0; n < group_width (p->saddle->s, j); n++)
@@ -610,8 +597,6 @@ static int massless_open (saddle_plan *p, pw_error *error) {
   return status;
 }
 
-/* ---- Nodes of the condensed matrix ---- */
-
 /* Begins a node: the contributions that follow are its own. */
 static void condense_add_node (saddle_plan *plan, pw_plan_node node) {
   plan->failed |= pw_grow (&plan->node, (size_t)plan->nodes, &plan->node_room, sizeof *plan->node) != PW_OK;
@@ -696,7 +681,9 @@ static void condense_elements (saddle_plan *plan) {
 static int condense_remains (const saddle_plan *plan, const pw_component *p, int i) {
   int prescribed = 0;
   for (int n = 0; n < p->cols; n++) {
-    if (plan->saddle->inverse_weight[p->global[n]] > 0 && massless_is_entry (p, i, n)) return 1;
+    const double entry = fabs (p->A[i * p->cols + n]) * sqrt (p->squared_scale[n]);
+    if (plan->saddle->inverse_weight[p->global[n]] > 0 && entry > MASSLESS_ROUND_OFF * sqrt (p->row[i].squared_terms))
+      return 1;
     prescribed |= !p->is_massless[n] && plan->saddle->inverse_weight[p->global[n]] == 0;
   }
   return p->massives > 0 && !prescribed;
@@ -725,8 +712,6 @@ static int condense_sort (saddle_plan *plan) {
   for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].group + 1]++] = p;
   return PW_OK;
 }
-
-/* ---- Dependent equations ---- */
 
 /* The end of the contributions of node n: one after the last. */
 static int condense_end (const saddle_plan *plan, int n) {
@@ -762,17 +747,15 @@ static int condense_find_dependent (saddle_plan *plan, int *row) {
   return *row = equation[count], PW_OK;
 }
 
-/* ---- Ranks of the nodes of a scene with uncondensed bodies ----
- *
- * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.
- * The matrix of rank 0 must be regular wherever the mechanism is.  A leg is a set of bodies joined by nodes that touch
- * neither uncondensed bodies nor the ground.  If a leg joins an uncondensed body to the ground, or to another
- * uncondensed body, and both its ends were at rest, the matrix would be singular where the leg is stretched.  So the
- * nodes at one end have rank 2: at the ground, or at one of the two bodies.  Then multipliers of rank 0 that exert no
- * force on the bodies of a leg exert none on the body at its other end either, since the forces of a joint on its two
- * bodies are opposite: dependent equations of rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies
- * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank
- * 0: no other equation contains the wheel's spin. */
+/* Ranks of the nodes of a scene with uncondensed bodies.  Nodes of rank 0 are eliminated before the uncondensed bodies,
+ * as if these were at rest; those of rank 2 after them.  The matrix of rank 0 must be regular wherever the mechanism
+ * is.  A leg is a set of bodies joined by nodes that touch neither uncondensed bodies nor the ground.  If a leg joins
+ * an uncondensed body to the ground, or to another uncondensed body, and both its ends were at rest, the matrix would
+ * be singular where the leg is stretched.  So the nodes at one end have rank 2: at the ground, or at one of the two
+ * bodies.  Then multipliers of rank 0 that exert no force on the bodies of a leg exert none on the body at its other
+ * end either, since the forces of a joint on its two bodies are opposite: dependent equations of rank 0 are dependent
+ * in the whole mechanism.  Nodes of uncondensed bodies alone have rank 2, too: with these at rest their equations would
+ * be empty.  The rolling equation of a wheel has rank 0: no other equation contains the wheel's spin. */
 
 /* 1 if node n touches the ground, or prescribed coordinates of a condensed body, which are at rest as well. */
 static int rank_is_grounded (const saddle_plan *plan, int n) {
@@ -819,8 +802,6 @@ static int condense_rank (saddle_plan *plan) {
   return PW_OK;
 }
 
-/* ---- Bodies that are not condensed ---- */
-
 /* A body to which more nodes than this contribute is not condensed: n nodes have n (n - 1) / 2 couplings, but only 2 n
  * with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes, 0.7 to 1.0 with 6. */
 enum { CONDENSE_NODES = 6 };
@@ -843,13 +824,9 @@ static int condense_uncondensed (saddle_plan *plan) {
   return plan->failed || saddle->y == NULL ? PW_RESOURCE : condense_rank (plan);
 }
 
-/* ---- Pattern of S ---- */
-
 static void condense_add_pair (saddle_plan *plan, int a, int b) {
   plan->failed |= pw_grow (&plan->pair, (size_t)plan->pairs, &plan->pair_room, 2 * sizeof *plan->pair) != PW_OK;
-  if (plan->failed) return;
-  plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs + 1] = b;
-  plan->pairs++;
+  if (!plan->failed) plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs++ + 1] = b;
 }
 
 /* Lists the pairs of nodes that meet at a group, or, if that is an uncondensed body, each of them with its nodes. */
@@ -877,8 +854,6 @@ static void condense_sort_columns (const saddle_plan *plan, const int *column_of
       }
   }
 }
-
-/* ---- Groups ---- */
 
 /* Fills the block p of group g; *contributions, *couplings: numbers of those filled so far. */
 static void condense_group (const saddle_plan *plan, pw_block_ldl *l, int g, pw_group_block *p, int *contributions,
@@ -931,8 +906,6 @@ static int condense_fill (const saddle_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
-/* ---- Chains ---- */
-
 /* Fills link for a body whose two nodes are a column and the next one, the only row below it.  Returns the column; -1
  * if the body cannot be in a chain. */
 static int chain_link (const saddle_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
@@ -978,8 +951,6 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
-/* ---- A dense matrix ---- */
-
 /* Appends group g, unless it is massless; first: row of each node. */
 static void condense_dense_group (const saddle_plan *plan, int g, const int *first) {
   const int j = group_first (plan->saddle->s, g), width = group_width (plan->saddle->s, j);
@@ -995,7 +966,6 @@ static void condense_dense_group (const saddle_plan *plan, int g, const int *fir
     }
 }
 
-/* The dense matrix of a scene with few equations. */
 static int condense_dense (const saddle_plan *plan) {
   pw_saddle *saddle = plan->saddle;
   int first[PW_DENSE], known = 0;
@@ -1023,8 +993,6 @@ static int condense_block (saddle_plan *plan) {
   if (status == PW_OK) status = pw_block_lay_out (l);
   return status == PW_OK ? condense_fill (plan, l) : status;
 }
-
-/* ---- Factorisation and solution ---- */
 
 void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
   saddle->postponed = pivot;
@@ -1111,8 +1079,6 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
   if (row) *row = saddle_pivot_row (saddle);
   return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
 }
-
-/* ---- Opening ---- */
 
 void pw_saddle_close (pw_saddle *saddle) {
   if (saddle == NULL) return;

@@ -23,9 +23,7 @@ int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *col
   return x->symbolic ? PW_OK : PW_RESOURCE;
 }
 
-/* ---- Order ----
- *
- * Minimum degree presumes that the pivots are those of the diagonal.  Unknowns without a diagonal entry, such as
+/* Minimum degree presumes that the pivots are those of the diagonal.  Unknowns without a diagonal entry, such as
  * multipliers, have none until unknowns coupled with them are eliminated.  Each is paired with that one whose entries
  * in its row and in its column are largest, and eliminated right after it (Duff & Pralet 2005, Strategies for scaling
  * and pivoting for sparse symmetric indefinite problems). */
@@ -82,8 +80,6 @@ static int sparse_analyse (pw_sparse *x, const double *value) {
   free (memory);
   return x->symbolic ? PW_OK : PW_RESOURCE;
 }
-
-/* ---- Factorisation ---- */
 
 void pw_sparse_forget_pivots (pw_sparse *x) {
   if (x->factors) SPARSE_KLU (x, free_numeric, &x->factors, &x->common);

@@ -4,24 +4,18 @@
 #include "tangent.h"
 #include "util.h"
 
-/* The largest block of a batch, and the largest count x cols. */
-static void tangent_sizes (const pw_system *s, size_t *block, size_t *direction) {
-  *block = *direction = 1;
+int pw_tangent_open (pw_tangent *x, pw_run *r) {
+  const pw_system *s = r->s;
+  size_t block = 1, direction = 1; /* the largest block of a batch, and the largest count x cols */
+  *x = (pw_tangent){ .run = r };
+  r->uses_derivatives = 1;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
                  widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, (size_t)k->kind->signals }; /* last: force_u */
-    if (columns > *direction) *direction = columns;
+    if (columns > direction) direction = columns;
     for (int i = 0; i < 3; i++)
-      if (columns * widths[i] > *block) *block = columns * widths[i];
+      if (columns * widths[i] > block) block = columns * widths[i];
   }
-}
-
-int pw_tangent_open (pw_tangent *x, pw_run *r) {
-  const pw_system *s = r->s;
-  size_t block, direction;
-  *x = (pw_tangent){ .run = r };
-  r->uses_derivatives = 1;
-  tangent_sizes (s, &block, &direction);
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
     x->row_index = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row_index);
     x->row = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row);
@@ -60,31 +54,15 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
   for (int i = 0; i < count; i++) active[i] = all[x->row[i]];
 }
 
-/* ---- Blocks ---- */
-
-/* Copies the entries of a vector of coordinates that belong to the columns of each element; 0 for the ground. */
-static void tangent_gather (const pw_system *s, const pw_element_batch *k, const double *vector, double *local) {
-  for (int e = 0; e < k->b.count; e++)
-    for (int c = 0; c < k->b.cols; c++) {
-      int j = pw_global (k, e, c);
-      *local++ = j < s->coords ? vector[j] : 0;
-    }
-}
-
 /* What a batch adds: its rows of J, or their transpose; blocks whose rows are its constraint equations, or its
  * coordinates. */
 typedef enum { TANGENT_J, TANGENT_JT, TANGENT_EQUATIONS, TANGENT_COORDINATES } tangent_part;
 
-/* 1 for a column of x or y, 0 for one of an angle. */
-static inline int tangent_is_length (int c) {
-  return c % 3 != 2;
-}
-
 /* 1 for an entry of a pin that is always zero: in columns of x and y its rows of J are constant, multiples of unit
  * vectors, so that their derivatives are in columns of angles only, and those of J^T lambda in rows of angles only. */
 static inline int tangent_is_zero (tangent_part part, int r, int c) {
-  if (part == TANGENT_J || part == TANGENT_JT) return tangent_is_length (c) && c % 3 == 1 - r;
-  return tangent_is_length (c) || (part == TANGENT_COORDINATES && tangent_is_length (r));
+  if (part == TANGENT_J || part == TANGENT_JT) return c % 3 != 2 && c % 3 == 1 - r;
+  return c % 3 != 2 || (part == TANGENT_COORDINATES && r % 3 != 2);
 }
 
 /* Adds the values of a batch, rows x columns of each element. */
@@ -115,7 +93,10 @@ void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *pu
     int of_equations = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
     if ((of_equations || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
     if (pw_block_function (k->kind, block) == NULL) continue;
-    if (put->direction) tangent_gather (w->s, k, put->direction, x->direction);
+    for (int n = 0; put->direction && n < k->b.count * k->b.cols; n++) { /* 0 for the ground */
+      const int j = pw_global (k, n / k->b.cols, n % k->b.cols);
+      x->direction[n] = j < w->s->coords ? put->direction[j] : 0;
+    }
     k->b.w = x->direction;
     k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
     if (!x->scatter.recording) pw_evaluate_block (w, k, block, x->block);
@@ -123,25 +104,10 @@ void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *pu
   }
 }
 
-/* Adds J or J^T. */
 static void tangent_put_J (pw_tangent *x, tangent_part part, const pw_placement *put) {
   const pw_workspace *w = x->run->w;
   for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints && k->row < put->rows; k++)
     tangent_put (x, k, part, k->J, put);
-}
-
-/* Adds to J^T, in the columns of the equations on which they depend, the rows of multipliers that are multiples. */
-static void tangent_put_couplings (pw_tangent *x, const pw_placement *put) {
-  const pw_run *r = x->run;
-  for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++) {
-    int e;
-    const double *J;
-    const pw_element_batch *k = pw_find_row (r->w, c->row, &e, &J);
-    for (int i = 0; i < k->b.cols; i++)
-      if (pw_global (k, e, i) < r->s->coords)
-        pw_scatter_add (&x->scatter, put->row + pw_global (k, e, i), put->col + x->row_index[c->on],
-                        x->scatter.recording ? 0 : put->factor * c->ratio * J[i]);
-  }
 }
 
 void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put) {
@@ -215,16 +181,6 @@ static void given_add_row (pw_tangent *x, pw_element_batch *k, int i, int row, i
   }
 }
 
-/* Adds J^T d lambda/d(q, v) of the equations whose given multipliers depend on states. */
-static void tangent_add_given (pw_tangent *x, int row, int col_q, int col_v) {
-  const pw_run *r = x->run;
-  for (pw_element_batch *k = r->w->batch; k < r->w->batch + r->s->constraints; k++) {
-    if (!k->kind->limits) continue;
-    given_velocities (x, k);
-    for (int i = 0; i < k->b.count * k->kind->rows; i++) given_add_row (x, k, i, row, col_q, col_v);
-  }
-}
-
 /* Adds `coefficient` times the gradient of a signal to a row. */
 static void feedback_add_gradient (pw_tangent *x, const pw_source *source, double coefficient, int row,
                                    const pw_feedback *put) {
@@ -252,7 +208,6 @@ static void feedback_add_rate (pw_tangent *x, const pw_source *source, double co
   }
 }
 
-/* Adds what depends on signal u of element e. */
 static void feedback_add (pw_tangent *x, const pw_element_batch *k, int e, int u, const pw_feedback *put) {
   const pw_source *source = &k->source[e * k->kind->signals + u];
   const int n = x->run->s->coords;
@@ -289,8 +244,6 @@ void pw_tangent_add_feedback (pw_tangent *x, const pw_feedback *put) {
       if (k->source[i].feedback) feedback_add (x, k, i / k->kind->signals, i % k->kind->signals, put);
 }
 
-/* ---- Equations ---- */
-
 void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
                                double nonholonomic) {
   const pw_placement put = { row,           col, x->run->s->rows, holonomic, nonholonomic, .row_index = x->row_index,
@@ -305,6 +258,7 @@ void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonom
 /* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */
 void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda) {
   const pw_system *s = x->run->s;
+  pw_workspace *w = x->run->w;
   if (x->run->forces == PW_FORCES_AT_LIMITS) {
     if (lambda != x->lambda) memcpy (x->lambda, lambda, (size_t)s->rows * sizeof *lambda);
     pw_fill_given (x->run, x->lambda);
@@ -319,14 +273,26 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   put.col = to->v;
   pw_tangent_add_block (x, PW_FORCE_V, &put);
   pw_tangent_add_signals (x, to->momentum, to->q, to->v);
-  if (x->run->update_given) tangent_add_given (x, to->momentum, to->q, to->v);
+  for (pw_element_batch *k = w->batch; x->run->update_given && k < w->batch + s->constraints; k++) {
+    if (!k->kind->limits) continue;
+    given_velocities (x, k); /* J^T d lambda/d(q, v) of the equations whose given multipliers depend on states */
+    for (int i = 0; i < k->b.count * k->kind->rows; i++) given_add_row (x, k, i, to->momentum, to->q, to->v);
+  }
   for (int j = 0; j < s->coords; j++)
     pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->a_factor * s->mass[j]);
   pw_tangent_add_feedback (x, &(pw_feedback){ to->momentum, to->q, to->v, 1, 1, .lambda = lambda });
   put.factor = put.factor_nonholonomic = to->lambda_factor;
   put.col = to->lambda;
   pw_tangent_add_JT (x, &put);
-  tangent_put_couplings (x, &put);
+  for (const pw_coupling *c = x->run->coupling; c < x->run->coupling + x->run->couplings; c++) {
+    int e; /* the multiplier of the row c->row is a multiple of that of c->on */
+    const double *J;
+    const pw_element_batch *k = pw_find_row (w, c->row, &e, &J);
+    for (int i = 0; i < k->b.cols; i++)
+      if (pw_global (k, e, i) < s->coords)
+        pw_scatter_add (&x->scatter, put.row + pw_global (k, e, i), put.col + x->row_index[c->on],
+                        x->scatter.recording ? 0 : put.factor * c->ratio * J[i]);
+  }
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 J (holonomic); 2 alpha J - gamma_v; J */
@@ -345,8 +311,6 @@ void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, c
   pw_tangent_add_J (x, r->s->holonomic, row, to->q, r->beta * r->beta, 0);
   if (to->a != to->v) pw_tangent_add_J (x, rows, row, to->a, to->a_factor, to->a_factor);
 }
-
-/* Residual and Newton matrix of the equations of motion as differential-algebraic equations; see tangent.h. */
 
 int pw_dae_open (pw_dae *x, pw_run *r) {
   const pw_system *s = r->s;
@@ -368,8 +332,6 @@ void pw_dae_close (pw_dae *x) {
   pw_tangent_close (&x->tangent);
   free (x->memory);
 }
-
-/* ---- Residual ---- */
 
 /* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated.
  * Overwrites x->lambda. */
@@ -406,8 +368,6 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
   for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);
 }
-
-/* ---- Matrix ---- */
 
 /* The derivatives of the kinematics with respect to q: q_dot_factor I + D (G^T mu)_q; v: -I; mu: mu_factor D G^T. */
 static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
@@ -466,8 +426,6 @@ int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *l
   pw_dae_matrix (x, v, a, lambda, 1, 1);
   return pw_scatter_lay_out (&t->scatter, x->size);
 }
-
-/* Recording and layout of the sequence of contributions to a sparse matrix; see tangent.h. */
 
 void pw_scatter_record_entry (pw_scatter_map *t, int row, int col) {
   t->failed |= pw_grow (&t->entry, t->count, &t->room, sizeof *t->entry) != PW_OK;

@@ -75,14 +75,10 @@ typedef struct {
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE; close it in every case */
 void pw_tangent_close (pw_tangent *x);
 
-/* ---- From values of the active equations to those of all, and back ---- */
-
 /* Fills `all`, which is returned: multipliers of the first `count` active equations, 0 for the others. */
 const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all);
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active);
-
-/* ---- Adding to the matrix that `scatter` records or fills ---- */
 
 /* Where and how a block is added.  Its rows are coordinates or constraint equations. */
 typedef struct {
