@@ -58,8 +58,6 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) {
   return buffer;
 }
 
-/* ---- Suggestions of valid names for unknown ones, domains of numbers ---- */
-
 /* Edit distance, in which exchanging neighbours is one change (Damerau 1964, optimal string alignment), keeping three
  * rows of the table; for a candidate longer than a row, its length. */
 static size_t nearest_distance (const char *a, const char *b) {

@@ -122,9 +122,7 @@ PER_ELEMENT (line_gamma_v, line, 6) {
   line_multiply_H (&now, -2, v, out);
 }
 
-/* ---- A coordinate of body 1 in the frame of body 2: x or y of a point, or the angle ---- */
-
-/* what: PW_DRIVE_... */
+/* A coordinate of body 1 in the frame of body 2: x or y of a point, or the angle; what: PW_DRIVE_... */
 static inline line line_of_coordinate (const double at[2][2], int what) {
   line out = { .s1 = { at[0][0], at[0][1] }, .is_angle = what == PW_DRIVE_ANGLE };
   if (what == PW_DRIVE_ANGLE) return out;

@@ -49,8 +49,6 @@ static const char *compile_text (const compilation *job, const char *text) {
   return copy;
 }
 
-/* ---- Counting ---- */
-
 static int compile_names (compilation *job) {
   const pw_model *m = job->m;
   const size_t names = (size_t)m->bodies + (size_t)m->elements + (size_t)m->outputs;
@@ -170,8 +168,6 @@ static int compile_sizes (const compilation *job) {
   return PW_OK;
 }
 
-/* ---- Bodies and elements ---- */
-
 /* Origin of the initial value of a body's state (0 to 5: x to omega); `zero`: the origin of a 0 without `specified`. */
 static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char zero) {
   if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
@@ -277,8 +273,6 @@ static int compile_batches (const compilation *job) {
   return status;
 }
 
-/* ---- Signals ---- */
-
 static int compile_table (const compilation *job, pw_source *source, const char *element) {
   pw_points *table = &source->signal.table;
   size_t n = (size_t)table->count;
@@ -376,8 +370,6 @@ static int compile_signals (const compilation *job) {
       }
   return PW_OK;
 }
-
-/* ---- Initial values, scales, ledger ---- */
 
 /* Values of pw_model_set_initial. */
 static int compile_initial (const compilation *job) {
@@ -556,8 +548,6 @@ static int compile_ledger (const compilation *job) {
   }
   return PW_OK;
 }
-
-/* ---- Outputs ---- */
 
 /* Finds the columns that an output reads: those of the motion, and outputs added before. */
 static int compile_output_reads (const compilation *job, pw_compiled_output *o) {

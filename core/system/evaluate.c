@@ -235,8 +235,6 @@ void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_r
   pw_evaluate_velocity_residual (w, enforced, 0, r);
 }
 
-/* ---- Kinematics ---- */
-
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->internal;
@@ -264,31 +262,8 @@ __attribute__ ((always_inline)) static inline void update_configurations (pw_wor
   }
 }
 
-/* Copies the states that a function reads; q NULL: only velocities.  Returns the number of states copied. */
-static int kinematics_copy_states (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
-  int copied = 0;
-  for (int r = 0; r < source->reads; r++) {
-    int j = source->state[r], velocity = j >= w->s->coords;
-    if (q == NULL && !velocity) continue;
-    source->x[r] = velocity ? v[j - w->s->coords] : q[j];
-    copied++;
-  }
-  return copied;
-}
-
 double pw_read_rate (const pw_workspace *w, int j, const double *v) {
   return j < w->s->coords ? v[j] : pw_rate_source (w, j - w->s->coords)->u[0];
-}
-
-/* The rates of feedback signals, after all signals have been evaluated. */
-static void kinematics_feedback_rates (pw_workspace *w, const double *v) {
-  for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    if (!source->feedback || source->held) continue;
-    double rate = source->u[2];
-    for (int r = 0; r < source->reads; r++)
-      rate += source->x[source->reads + r] * pw_read_rate (w, source->state[r], v);
-    source->u[1] = rate;
-  }
 }
 
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
@@ -297,14 +272,26 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     if (source->held) continue;
-    const int copied = kinematics_copy_states (w, source, q, v);
+    int copied = 0; /* states that a function reads; q NULL: only velocities */
+    for (int r = 0; r < source->reads; r++) {
+      const int j = source->state[r], velocity = j >= w->s->coords;
+      if (q == NULL && !velocity) continue;
+      source->x[r] = velocity ? v[j - w->s->coords] : q[j];
+      copied++;
+    }
     if (copied == 0 && !(new_time && source->reads == 0)) continue;
     if (pw_signal_eval (source, copied && source->of_coordinate ? *source->x : t) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }
-  if (w->s->feedback) kinematics_feedback_rates (w, v);
   w->t_signal = t; /* unchanged unless the time is new */
+  for (const pw_source *source = w->source, *end = source + w->s->sources; w->s->feedback && source < end; source++) {
+    if (!source->feedback || source->held) continue;
+    double rate = source->u[2]; /* after all signals have been evaluated */
+    for (int r = 0; r < source->reads; r++)
+      rate += source->x[source->reads + r] * pw_read_rate (w, source->state[r], v);
+    source->u[1] = rate;
+  }
   return PW_OK;
 }
 
@@ -344,10 +331,9 @@ double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   return next;
 }
 
-/* ---- Second-order blocks, by formulas or by differences ----
- *
- * Central differences with step h = eps^(1/3) in units of the scene (more for values above 1, see blocks_step):
- * truncation and round-off are both of the order eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
+/* Second-order blocks, by formulas or by differences.  Central differences with step h = eps^(1/3) in units of the
+ * scene (more for values above 1, see blocks_step): truncation and round-off are both of the order eps^(2/3) (Dennis &
+ * Schnabel 1983, section 5.6). */
 
 /* Each block is the derivative of `original` of the type's table, or of its product with w or lambda.  `function`: the
  * type's function for it; for PW_JTL_Q jw_q, from which blocks_transpose computes the block. */
@@ -678,8 +664,6 @@ int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
   return 0;
 }
 
-/* ---- The ledger ---- */
-
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   for (const pw_entry *entry = w->s->entry, *end = entry + w->s->powers; entry < end;) {
     const pw_entry *first = entry;
@@ -701,8 +685,6 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
     }
   }
 }
-
-/* ---- Workspaces ---- */
 
 /* Copies batches and signals of the system, with arrays of the workspace; x: for the states that signals read. */
 static void workspace_fill (pw_workspace *w, double *x) {
@@ -728,17 +710,13 @@ static void workspace_fill (pw_workspace *w, double *x) {
   w->configuration[s->bodies].cos = 1;
 }
 
-static int workspace_open_signals (pw_workspace *w) {
-  int status = PW_OK;
-  for (pw_source *source = w->source; source < w->source + w->s->sources; source++) {
-    pw_function *f = &source->signal.function;
-    if (source->signal.type != PW_FUNCTION || f->open == NULL) continue;
-    f->context = status == PW_OK ? f->open (f->context) : NULL;
-    if (f->context) continue;
-    status = PW_RESOURCE; /* pw_close_signals must skip this signal and the following ones, which are not opened */
-    f->close = NULL;
-  }
-  return status;
+/* Opens a function unless *status reports that one could not be opened; then nothing has to be closed. */
+static void workspace_open_function (pw_function *f, int *status) {
+  if (f->open == NULL) return;
+  f->context = *status == PW_OK ? f->open (f->context) : NULL;
+  if (f->context) return;
+  *status = PW_RESOURCE;
+  f->close = NULL;
 }
 
 void pw_close_signals (const pw_source *source, int count) {
@@ -751,14 +729,7 @@ void pw_close_signals (const pw_source *source, int count) {
 
 int pw_open_outputs (pw_compiled_output *output, int count) {
   int status = PW_OK;
-  for (int i = 0; i < count; i++) {
-    pw_function *f = &output[i].function;
-    if (f->open == NULL) continue;
-    f->context = status == PW_OK ? f->open (f->context) : NULL;
-    if (f->context) continue;
-    status = PW_RESOURCE;
-    f->close = NULL; /* pw_close_outputs must skip it */
-  }
+  for (int i = 0; i < count; i++) workspace_open_function (&output[i].function, &status);
   return status;
 }
 
@@ -789,8 +760,10 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
   if (w) {
     *w = all;
     workspace_fill (w, x);
-    int status = workspace_open_signals (w);
-    if (status == PW_OK) status = pw_open_outputs (w->output, s->outputs);
+    int status = PW_OK;
+    for (pw_source *source = w->source; source < w->source + s->sources; source++)
+      if (source->signal.type == PW_FUNCTION) workspace_open_function (&source->signal.function, &status);
+    for (int i = 0; i < s->outputs; i++) workspace_open_function (&w->output[i].function, &status);
     if (status == PW_OK) return w;
   }
   pw_workspace_free (w);
@@ -803,8 +776,6 @@ void pw_workspace_free (pw_workspace *w) {
   if (w) pw_close_outputs (w->output, w->s->outputs);
   free (w);
 }
-
-/* ---- Elements: properties, contact points and forces; the equations of motion ---- */
 
 int pw_system_elements (const pw_system *s) {
   int count = 0;
@@ -834,7 +805,7 @@ static int elements_update (pw_workspace *w, double t, const double *q, const do
   return pw_update_kinematics (w, t, q, v) == PW_OK ? PW_OK : pw_fail_evaluation (w, t, error);
 }
 
-static void elements_contacts (const pw_workspace *w, double (*out)[3]) {
+void pw_evaluate_contacts (const pw_workspace *w, double (*out)[3]) {
   PW_EACH_BATCH (k, w) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
@@ -845,7 +816,7 @@ static void elements_contacts (const pw_workspace *w, double (*out)[3]) {
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error) {
   int status = elements_update (w, t, q, v, error);
-  if (status == PW_OK) elements_contacts (w, out);
+  if (status == PW_OK) pw_evaluate_contacts (w, out);
   return status;
 }
 
@@ -875,13 +846,13 @@ int pw_workspace_columns (pw_workspace *w, const pw_sample *x, const pw_column *
   for (int i = 0; i < count; i++) contacts |= c[i].type == PW_COLUMN_CONTACT;
   int status = contacts ? elements_update (w, x->t, x->q, x->v, error) : pw_require (w, "a workspace", error);
   if (status != PW_OK) return status;
-  if (contacts) elements_contacts (w, w->contact);
+  if (contacts) pw_evaluate_contacts (w, w->contact);
   for (int i = 0; i < count; i++) value[i] = elements_column (w, x, x->output, x->ledger, c[i]);
   return PW_OK;
 }
 
 void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *ledger) {
-  if (w->s->output_types >> PW_COLUMN_CONTACT & 1) elements_contacts (w, w->contact);
+  if (w->s->output_types >> PW_COLUMN_CONTACT & 1) pw_evaluate_contacts (w, w->contact);
   for (int i = 0; i < w->s->outputs; i++) {
     const pw_compiled_output *o = &w->output[i];
     double read[PW_OUTPUT_READS + 1], value[3] = { NAN };

@@ -8,8 +8,6 @@
 #include <string.h>
 #include "model.h"
 
-/* ---- Element types: a table is checked before use, so that a mistake in a plug-in does not crash the program ---- */
-
 const pw_kind *const pw_kinds[] = {
 #define PW_KIND(k) &pw_kind_##k,
   PW_KINDS
@@ -140,6 +138,7 @@ static const char *fault_names (const pw_kind *kind) {
   return "";
 }
 
+/* A table is checked before use, so that a mistake in a plug-in does not crash the program. */
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   if (kind->name == NULL || *kind->name == 0) return "no name";
   if (is_bad_text (kind->name)) return "its name" FAULT_TEXT;
@@ -158,8 +157,6 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   if (*fault == 0) fault = fault_fields (kind, buffer, size);
   return *fault ? fault : fault_functions (kind);
 }
-
-/* ---- Checks of plug-ins, bodies and elements ---- */
 
 /* Names and units are one line, since tables have them in their heads; a description may have several lines. */
 static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
@@ -342,8 +339,6 @@ int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error) {
   return pw_fail (error, PW_INPUT, "model %s: %d outputs; a model has at most %d", m->name, m->outputs,
                   PW_MOST_OUTPUTS);
 }
-
-/* ---- Models ---- */
 
 /* An object that the model owns. */
 struct pw_kept {

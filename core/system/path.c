@@ -26,8 +26,6 @@ struct pw_path {
   piece *piece;
 };
 
-/* ---- Pieces ---- */
-
 /* Value and first three derivatives by u of x and y. */
 static inline void piece_point (const piece *c, double u, double out[2][4]) {
   for (int k = 0; k < 2; k++) {
@@ -51,18 +49,6 @@ static double piece_length (const piece *c, double u) {
     sum += weight[i % 4] * sqrt (point[0][1] * point[0][1] + point[1][1] * point[1][1]);
   }
   return u / 2 * sum;
-}
-
-/* The parameter at an arc length from the beginning of the piece, by Newton's method. */
-static double piece_parameter (const piece *c, double s) {
-  double u = s / c->size;
-  for (int i = 0; i < 20 && u > 0 && u < 1; i++) {
-    double x[2][4], last = u;
-    piece_point (c, u, x);
-    u = fmin (1, fmax (0, u - (piece_length (c, u) - s) / hypot (x[0][1], x[1][1])));
-    if (fabs (u - last) <= 1e-15) break;
-  }
-  return fmin (1, fmax (0, u));
 }
 
 static void piece_halve (const piece *c, piece half[2]) {
@@ -92,20 +78,15 @@ static int piece_is_good (const piece *c, const piece half[2]) {
   return fabs (piece_length (&half[0], 1) + piece_length (&half[1], 1) - whole) <= 1e-14 * whole;
 }
 
-/* ---- Making a path ---- */
-
 enum { PATH_HALVINGS = 40 /* most of a cubic: closer to a cusp there is no direction */ };
-
-static int make_fail_memory (pw_error *error) {
-  return pw_fail (error, PW_RESOURCE, "out of memory");
-}
 
 /* Appends a piece, or its halves; point: at which its cubic begins, from 1; room: pieces allocated. */
 static int make_pieces (pw_path *p, const piece *c, int point, int halvings, size_t *room, pw_error *error) {
   piece half[2] = { { .s = 0 } };
   if (!p->is_linear) piece_halve (c, half);
   if (p->is_linear || piece_is_good (c, half)) {
-    if (pw_grow (&p->piece, (size_t)p->pieces, room, sizeof *p->piece) != PW_OK) return make_fail_memory (error);
+    if (pw_grow (&p->piece, (size_t)p->pieces, room, sizeof *p->piece) != PW_OK)
+      return pw_fail (error, PW_RESOURCE, "out of memory");
     p->piece[p->pieces++] = *c;
     return PW_OK;
   }
@@ -127,7 +108,7 @@ static int make_all_pieces (pw_path *p, const double *x, const double *y, int co
   };
   char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   size_t room = 0;
-  if (memory == NULL) return make_fail_memory (error);
+  if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < n; i++) {
     const int from = (i + count - before % count) % count;
     point[0][i] = x[from], point[1][i] = y[from];
@@ -203,7 +184,7 @@ pw_path *pw_path_open (const double *x, const double *y, int count, int interpol
     count--;
   if (make_check (x, y, count, interpolation, closed, error) != PW_OK) return NULL;
   pw_path *p = calloc (1, sizeof *p);
-  if (p == NULL) return make_fail_memory (error), NULL;
+  if (p == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   atomic_init (&p->users, 1);
   p->closed = closed != 0, p->is_linear = interpolation == PW_LINEAR;
   if (make_all_pieces (p, x, y, count, error) == PW_OK && make_index (p, error) == PW_OK) return p;
@@ -251,8 +232,6 @@ int pw_path_is_smooth (const pw_path *p) {
   return !p->is_linear;
 }
 
-/* ---- Places ---- */
-
 /* A place: parameter u of piece i in a lap; beyond an end of an open path, the signed distance from it. */
 typedef struct {
   int i;
@@ -276,8 +255,17 @@ static place place_at (const pw_path *p, double s) {
   place at = { .lap = p->closed ? floor (s / p->length) : 0 };
   const double along = s - at.lap * p->length, inside = fmin (fmax (0, along), p->length);
   at.i = place_piece (p, inside);
-  at.u = piece_parameter (&p->piece[at.i], inside - p->piece[at.i].s);
   at.beyond = p->closed ? 0 : along - inside;
+  const piece *c = &p->piece[at.i];
+  const double part = inside - c->s; /* of the piece's arc length; its parameter u by Newton's method */
+  double u = part / c->size;
+  for (int i = 0; i < 20 && u > 0 && u < 1; i++) {
+    double x[2][4], last = u;
+    piece_point (c, u, x);
+    u = fmin (1, fmax (0, u - (piece_length (c, u) - part) / hypot (x[0][1], x[1][1])));
+    if (fabs (u - last) <= 1e-15) break;
+  }
+  at.u = fmin (1, fmax (0, u));
   return at;
 }
 
@@ -334,8 +322,6 @@ double pw_path_break (const pw_path *p, double s) {
   const double lap = (at.lap + 1) * p->length; /* where s is rounded to the end of the lap before, it is s itself */
   return lap > s ? lap : lap + p->piece[1].s;
 }
-
-/* ---- Nearest places ---- */
 
 typedef struct {
   const pw_path *p;

@@ -218,8 +218,6 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
   return query_find (s, "signal", s ? s->sources : 0, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
 }
 
-/* ---- Columns ---- */
-
 int pw_system_contacts (const pw_system *s) {
   int count = 0;
   for (int i = 0; i < s->batches; i++) count += s->batch[i].kind->contact ? s->batch[i].b.count : 0;
@@ -313,59 +311,21 @@ int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c) {
   return *c = (pw_column){ PW_COLUMN_LEDGER, is_loss }, 1;
 }
 
-/* Finds column NAME of element e of a batch; contacts: the number of contact points before the batch. */
-static int query_element_column (const pw_system *s, const pw_element_batch *k, int e, int contacts, const char *name,
-                                 pw_column *c) {
-  const int n = k->kind->internal;
-  if (!pw_kind_find_column (k->kind, name, c)) return 0;
-  if (c->type == PW_COLUMN_STATE) c->index = (c->index < n ? 0 : s->coords) + k->internal + e * n + c->index % n;
-  if (c->type == PW_COLUMN_REACTION) c->index += k->row + e * k->kind->rows;
-  if (c->type == PW_COLUMN_CONTACT) c->index += 2 * (contacts + e);
-  if (c->type != PW_COLUMN_LEDGER) return 1;
-  const int is_loss = c->index;
-  for (c->index = 0; c->index < s->entries; c->index++) {
-    const pw_entry *x = &s->entry[c->index];
-    if (x->batch == k - s->batch && x->element == e && (x->type == PW_LOSS) == is_loss) return 1;
-  }
-  return 0;
-}
-
-/* Finds a column of a body, an element or a first-order state; all names before the last dot are compared first. */
-static int query_member_column (const pw_system *s, const char *name, pw_column *c) {
-  const int state = query_body_state (s, name, 0, &(pw_nearest){ .sought = name });
-  if (state >= 0) return *c = (pw_column){ PW_COLUMN_STATE, state }, 1;
-  int contacts = 0;
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    for (int e = 0; e < k->b.count; e++) {
-      const char *body = k->kind->each_body ? s->body_name[k->b.body[e]] : "", *what = name;
-      size_t n = strlen (k->name[e]), m = strlen (body);
-      if (strncmp (what, k->name[e], n) != 0 || (what[n] != '.' && what[n] != 0)) continue;
-      what += n + (what[n] == '.'); /* nothing follows the name of a first-order state */
-      if (m > 0 && (strncmp (what, body, m) != 0 || what[m] != '.')) continue;
-      if (m > 0) what += m + 1;
-      if (query_element_column (s, k, e, contacts, what, c))
-        return c->type != PW_COLUMN_STATE || !pw_is_hidden (s, c->index);
-    }
-    if (k->kind->contact) contacts += k->b.count;
-  }
-  return 0;
-}
-
 int pw_system_find_column (const pw_system *s, const char *name, pw_column *c, pw_error *error) {
   char buffer[PW_NAME_BYTES];
   pw_nearest near = { .sought = name };
   if (pw_require (s, "a system", error) != PW_OK || pw_require (name, "the name of a column", error) != PW_OK)
     return PW_INPUT;
-  if (query_member_column (s, name, c) || pw_kind_find_column (NULL, name, c)) return PW_OK;
-  for (*c = (pw_column){ PW_COLUMN_OUTPUT, 0 }; c->index < s->outputs; c->index++)
-    if (strcmp (s->output[c->index].name, name) == 0) return PW_OK;
-  for (*c = (pw_column){ 0 }; c->type < PW_COLUMN_TYPES; c->type++)
-    for (c->index = 0; c->index < pw_system_columns (s, c->type); c->index++) {
-      if (c->type == PW_COLUMN_STATE && pw_is_hidden (s, c->index)) continue;
-      const char *known = pw_system_column_name (s, *c, buffer, sizeof buffer);
-      if (strcmp (known, name) == 0) return PW_OK;
-      pw_nearest_try (&near, known);
-    }
+  const int state = query_body_state (s, name, 0, &(pw_nearest){ .sought = name });
+  if (state >= 0) return *c = (pw_column){ PW_COLUMN_STATE, state }, PW_OK;
+  for (int is_unknown = 0; is_unknown < 2; is_unknown++)
+    for (*c = (pw_column){ 0 }; c->type < PW_COLUMN_TYPES; c->type++)
+      for (c->index = 0; c->index < pw_system_columns (s, c->type); c->index++) {
+        if (c->type == PW_COLUMN_STATE && pw_is_hidden (s, c->index)) continue;
+        const char *known = pw_system_column_name (s, *c, buffer, sizeof buffer);
+        if (strcmp (known, name) == 0) return PW_OK;
+        if (is_unknown) pw_nearest_try (&near, known);
+      }
   return pw_fail (error, PW_INPUT, "no column \"%.100s\"%s", name, pw_nearest_text (&near));
 }
 
@@ -455,8 +415,6 @@ int pw_system_may_jump (const pw_system *s) {
     if (s->source[i].reads > 0 && !s->source[i].of_coordinate) return 1;
   return 0;
 }
-
-/* ---- Reference solution ---- */
 
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return PW_INPUT;

@@ -4,8 +4,6 @@
 #include <string.h>
 #include "system.h"
 
-/* ---- Ramps, smooth steps, pulses ---- */
-
 /* A ramp, from + (to - from) x with x = (t - start) / duration; or a smooth step, with 10 x^3 - 15 x^4 + 6 x^5 in place
  * of x, whose first and second derivatives are 0 at both ends (Flash & Hogan 1985, Journal of Neuroscience 5,
  * 1688-1703).  Both are constant before their start and after their end. */
@@ -58,7 +56,7 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
   return t < end ? end : next > t ? next : INFINITY; /* next == t if the period is below the resolution of t */
 }
 
-/* ---- Tables: signals that interpolate points (t_i, y_i) ----
+/* Tables: signals that interpolate points (t_i, y_i).
  *
  *   u = y_i + b_i x + M_i x^2 / 2 + (M_j - M_i) x^3 / (6 h_i),   x = t - t_i,  j = i + 1,  h_i = t_j - t_i
  *
@@ -165,8 +163,6 @@ static void table_bounds (const pw_signal *s, const double *spline, double a, do
   }
 }
 
-/* ---- All signals ---- */
-
 /* Fails if a number that is needed is not finite, or no value is stored: a callback in another language that ends
  * before its first statement may return 0. */
 static int signal_function (const pw_source *source, double t) {
@@ -242,8 +238,6 @@ double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {
   return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
 }
 
-/* ---- Forms of signals ---- */
-
 #define FORM_AT(form, member) .name = #member, .offset = offsetof (pw_signal, form.member)
 
 static const pw_field form_harmonic[] = {
@@ -303,19 +297,7 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
   return f->name ? f : NULL;
 }
 
-/* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
-
-/* Each field is a number, or a choice that is 0 or 1. */
-static void form_check_fields (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
-  for (const pw_field *f = form->fields; f->name && !*text; f++) {
-    const void *at = (const char *)s + f->offset;
-    const char *expected = f->type == PW_NUMBER ? pw_domain_check (f->domain, *(const double *)at) : "";
-    int choice = f->type == PW_CHOICE ? *(const int *)at : 0;
-    if (*expected) snprintf (text, size, "%s = %g: expected %s", f->name, *(const double *)at, expected);
-    if (choice < 0 || choice > 1) snprintf (text, size, "%s = %d: expected 0 or 1", f->name, choice);
-  }
-}
-
+/* These write the fault to `text`, or leave it empty. */
 static void form_check_points (const pw_signal *s, int *point, char *text, size_t size) {
   const double *t = s->table.t, *y = s->table.value;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
@@ -377,10 +359,15 @@ char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char
     snprintf (buffer, size, "the signal of this constraint may depend on the time only");
   else if (s->type == PW_CONSTANT && !isfinite (s->constant))
     snprintf (buffer, size, "%g: expected a finite number", s->constant);
-  else if (form)
-    form_check_fields (s, form, buffer, size);
-  else if (s->type != PW_CONSTANT && s->type != PW_FUNCTION)
+  else if (!form && s->type != PW_CONSTANT && s->type != PW_FUNCTION)
     snprintf (buffer, size, "signal type %d does not exist", (int)s->type);
+  for (const pw_field *f = form ? form->fields : NULL; f && f->name && !*buffer; f++) {
+    const void *at = (const char *)s + f->offset; /* a number, or a choice that is 0 or 1 */
+    const char *expected = f->type == PW_NUMBER ? pw_domain_check (f->domain, *(const double *)at) : "";
+    const int choice = f->type == PW_CHOICE ? *(const int *)at : 0;
+    if (*expected) snprintf (buffer, size, "%s = %g: expected %s", f->name, *(const double *)at, expected);
+    if (choice < 0 || choice > 1) snprintf (buffer, size, "%s = %d: expected 0 or 1", f->name, choice);
+  }
   const pw_pulse *p = s->type == PW_PULSE ? &s->pulse : NULL;
   if (!*buffer && p && p->period > 0 && !(p->width > 0 && p->width < p->period))
     snprintf (buffer, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", p->period, p->period,

@@ -204,6 +204,7 @@ size_t pw_column_offset (pw_column_type type);
 
 /* Sets w->output_value, the outputs at a sample whose kinematics are evaluated; ledger: its entries, NULL: unknown. */
 void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *ledger);
+void pw_evaluate_contacts (const pw_workspace *w, double (*out)[3]); /* at the kinematics evaluated last */
 
 /* Opens the contexts of functions; a status.  Closes them. */
 int pw_open_outputs (pw_compiled_output *output, int count);

@@ -64,8 +64,7 @@ static double difference_formula (int side, int order, double f0, const double *
   return sum;
 }
 
-/* ---- Levels: steps that are tried ---- */
-
+/* A step that is tried. */
 typedef struct {
   int decade, side; /* step 10^-decade of the size; 0: central; 1, -1: the side of the neighbours */
   double step;
@@ -338,8 +337,6 @@ static pw_derivative difference_result (const difference *x, const difference_pa
     out.type = PW_UNKNOWN, out.value = out.error = NAN;
   return out;
 }
-
-/* ---- Two or four neighbours, at given steps ---- */
 
 /* Steps at which the error of the formula and that of the runs are about equal.  Neighbours that fail on one side are
  * replaced by those on the other. */

@@ -178,8 +178,6 @@ static int drift_solve (pw_run *r, double h, double t1) {
   return convergence == PW_CONVERGED ? PW_OK : PW_RETRY;
 }
 
-/* ---- Second half (kick): v', by fixed-point iteration ---- */
-
 /* One correction of v', for the change of the forces since the last correction; d->f: those forces, at first 0.
  * PW_METHOD if a signal failed. */
 static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {

@@ -5,8 +5,6 @@
 #include "method.h"
 #include "pinwheel-analysis.h"
 
-/* ---- Rows of samples (r->s->rows: the number of constraint equations) ---- */
-
 int pw_system_record_width (const pw_system *s, int ledger) {
   return PW_RECORD_STATES + 3 * s->coords + 2 * pw_system_contacts (s) + s->rows + s->outputs +
          (ledger ? s->entries : 0);
@@ -16,21 +14,25 @@ int pw_run_record_width (const pw_run *r) {
   return pw_system_record_width (r->s, r->settings.ledger);
 }
 
+/* The i-th number of a row; accelerations are states from 2 coords on. */
+static pw_column record_column (const pw_system *s, int i) {
+  static const pw_column_type first[PW_RECORD_STATES] = { PW_COLUMN_TIME,    PW_COLUMN_POSITION,   PW_COLUMN_VELOCITY,
+                                                          PW_COLUMN_KINETIC, PW_COLUMN_POTENTIAL,  PW_COLUMN_WORK,
+                                                          PW_COLUMN_LOSS,    PW_COLUMN_PROJECTION, PW_COLUMN_BALANCE },
+                              next[] = { PW_COLUMN_CONTACT, PW_COLUMN_REACTION, PW_COLUMN_OUTPUT };
+  if (i < PW_RECORD_STATES) return (pw_column){ first[i], 0 };
+  if ((i -= PW_RECORD_STATES) < 3 * s->coords) return (pw_column){ PW_COLUMN_STATE, i };
+  i -= 3 * s->coords;
+  for (int k = 0; k < 3; i -= pw_system_columns (s, next[k++]))
+    if (i < pw_system_columns (s, next[k])) return (pw_column){ next[k], i };
+  return (pw_column){ PW_COLUMN_LEDGER, i };
+}
+
 char *pw_system_record_name (const pw_system *s, int i, char *buffer, size_t size) {
-  static const char *const first[PW_RECORD_STATES] = { "t",       "residual.position", "residual.velocity",
-                                                       "kinetic", "potential",         "work",
-                                                       "loss",    "projection",        "balance" };
-  const int n = s->coords, contacts = 2 * pw_system_contacts (s);
-  if (i < PW_RECORD_STATES) return snprintf (buffer, size, "%s", first[i]), buffer;
-  if ((i -= PW_RECORD_STATES) < 2 * n) return pw_system_state_name (s, i, buffer, size);
-  if (i < 3 * n) {
-    pw_system_state_name (s, i - n, buffer, size);
-    return strncat (buffer, "'", size - strlen (buffer) - 1);
-  }
-  if ((i -= 3 * n) < contacts) return pw_system_contact_name (s, i, buffer, size);
-  if ((i -= contacts) < s->rows) return pw_system_reaction_name (s, i, buffer, size);
-  if ((i -= s->rows) < s->outputs) return pw_print (buffer, size, "%s", s->output[i].name);
-  return pw_system_ledger_name (s, i - s->outputs, buffer, size);
+  const pw_column c = record_column (s, i);
+  if (c.type != PW_COLUMN_STATE || c.index < 2 * s->coords) return pw_system_column_name (s, c, buffer, size);
+  pw_system_state_name (s, c.index - s->coords, buffer, size);
+  return strncat (buffer, "'", size - strlen (buffer) - 1);
 }
 
 /* Names of columns follow from those of bodies, elements and outputs. */
@@ -48,24 +50,11 @@ int pw_system_record_same (const pw_system *a, const pw_system *b, int ledger) {
 }
 
 const char *pw_system_record_unit (const pw_system *s, int i) {
-  const int n = s->coords, contacts = 2 * pw_system_contacts (s);
-  if (i < PW_RECORD_STATES) return i == 0 ? "s" : i < 3 ? "" : "J";
-  if ((i -= PW_RECORD_STATES) < 2 * n) return pw_system_state_unit (s, i);
-  if (i >= 2 * n + s->mechanical && i < 3 * n) return s->state_unit[2 * (i - 2 * n - s->mechanical) + 1];
-  if (i < 3 * n) return pw_system_state_unit (s, i - 2 * n)[0] == 'm' ? "m/s^2" : "rad/s^2";
-  if ((i -= 3 * n) < contacts) return "m";
-  if ((i -= contacts) < s->rows) return pw_system_reaction_unit (s, i);
-  return i - s->rows < s->outputs ? s->output[i - s->rows].unit : "J";
-}
-
-/* Stores x and y of all contact points at the sample, where kinematics are evaluated, and returns the end. */
-static double *record_contacts (const pw_run *r, double *to) {
-  PW_EACH_BATCH (k, r->w) {
-    if (k->kind->contact == NULL) continue;
-    k->kind->contact (&k->b, k->block);
-    for (int e = 0; e < k->b.count; e++, to += 2) memcpy (to, k->block + 3 * e, 2 * sizeof *to);
-  }
-  return to;
+  const pw_column c = record_column (s, i);
+  const int j = c.index - 2 * s->coords;
+  if (c.type != PW_COLUMN_STATE || j < 0) return pw_system_column_unit (s, c);
+  if (j >= s->mechanical) return s->state_unit[2 * (j - s->mechanical) + 1];
+  return pw_system_state_unit (s, j)[0] == 'm' ? "m/s^2" : "rad/s^2";
 }
 
 int pw_record_row (pw_run *r, double t, double *row, pw_error *error) {
@@ -80,7 +69,9 @@ int pw_record_row (pw_run *r, double t, double *row, pw_error *error) {
   memcpy (row, x.q, n * sizeof *row);
   memcpy (row + n, x.v, n * sizeof *row);
   memcpy (row + 2 * n, x.a, n * sizeof *row);
-  row = record_contacts (r, row + 3 * n);
+  row += 3 * n;
+  pw_evaluate_contacts (r->w, r->w->contact);
+  for (int i = 0; i < pw_system_contacts (r->s); i++, row += 2) memcpy (row, r->w->contact[i], 2 * sizeof *row);
   for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x.lambda[i]; /* reactions; no negative zeros */
   row += r->s->rows;
   if (r->s->outputs) memcpy (row, x.output, (size_t)r->s->outputs * sizeof *row);
@@ -88,7 +79,6 @@ int pw_record_row (pw_run *r, double t, double *row, pw_error *error) {
   return PW_OK;
 }
 
-/* Stores a sample in the next row. */
 static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_error *error) {
   int status = pw_record_row (r, t, rows + *recorded * pw_run_record_width (r), error);
   *recorded += status == PW_OK;
@@ -112,8 +102,6 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
   }
   return status;
 }
-
-/* ---- Version and layouts ---- */
 
 const char pw_version[] = PW_VERSION;
 
