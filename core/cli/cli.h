@@ -44,8 +44,8 @@ int pw_limit_over (void *context);
 /* Why a run returned PW_STOPPED at time t: PW_RETRY, without an error, if pw_stop is set (after a signal the command
  * returns PW_INTERRUPTED); else PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
-/* Starts the clock, and opens a run whose settings.stop is pw_limit_over.  If the run is stopped then, the error is
- * that of pw_limit_status, without a text if that is PW_RETRY. */
+/* Starts the clock, if there is one, and opens a run whose settings.stop is pw_limit_over, or NULL.  If the run is
+ * stopped then, the error is that of pw_limit_status, without a text if that is PW_RETRY. */
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* The time of a clock [s]. */
@@ -419,6 +419,19 @@ const char *pw_cli_status_word (int status);
  * file and line; returns the exit status.  A closed pipe on standard output is not reported: PW_CLOSED_PIPE. */
 int pw_cli_report_error (const pw_error *error);
 
+/* The end of a list of which `more` entries are not printed. */
+void pw_report_more (FILE *f, int more, const char *hint);
+/* Initial phi and headings that are probably degrees; expressions that may jump with states. */
+void pw_report_model (const pw_cli_model *m);
+/* Derivatives by differences, states changed by the consistent initialisation, redundant constraint equations. */
+void pw_report_initialisation (pw_run *run, const pw_system *system, const char *const *redundant);
+/* States that the consistent initialisation changes, if it succeeds within this processor time [s].  PW_OK or
+ * PW_RESOURCE. */
+int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *error);
+/* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are
+ * none or memory is exhausted. */
+const char **pw_report_redundancies (pw_run *run);
+
 /* ---- Strings of variable length, and the cells of a line of a CSV table ---- */
 
 /* A string; zero-initialised, it is empty. */
@@ -436,7 +449,7 @@ void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
 /* Add a cell, after a comma unless it is the first of its line: a number by pw_format, nan if not finite; or text. */
 void pw_text_number (pw_text *t, double value);
 void pw_text_cell (pw_text *t, const char *text);
-/* Adds the cell "NAME [UNIT]"; no unit if it is NULL or "". */
+/* Adds the cell "NAME [UNIT]", in quotes if the name has a comma; no unit if it is NULL or "". */
 void pw_text_name (pw_text *t, const char *name, const char *unit);
 /* Adds a cell in quotes; line ends in it become blanks. */
 void pw_text_quoted (pw_text *t, const char *text);

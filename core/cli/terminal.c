@@ -204,11 +204,11 @@ void pw_text_number (pw_text *t, double value) {
 }
 
 void pw_text_name (pw_text *t, const char *name, const char *unit) {
-  pw_text_cell (t, name);
-  if (unit == NULL || *unit == 0) return;
-  pw_text_add (t, " [");
-  pw_text_add (t, unit);
-  pw_text_add (t, "]");
+  const char *quote = strchr (name, ',') ? "\"" : "";
+  pw_text_cell (t, quote);
+  pw_text_add (t, name);
+  if (unit && *unit) pw_text_add (t, " ["), pw_text_add (t, unit), pw_text_add (t, "]");
+  pw_text_add (t, quote);
 }
 
 void pw_text_quoted (pw_text *t, const char *text) {
@@ -317,7 +317,7 @@ int pw_limit_over (void *context) {
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
   pw_limit *limit = settings->stop_context;
   pw_error own = { 0 };
-  pw_limit_start (limit);
+  if (limit) pw_limit_start (limit);
   pw_run *r = pw_run_open (s, method, settings, &own);
   if (own.status == PW_STOPPED && pw_stop)
     own = (pw_error){ .status = PW_RETRY };
