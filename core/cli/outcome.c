@@ -8,7 +8,7 @@
 #include "outcome.h"
 #include "cli.h"
 
-int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error) {
+static int outcome_column (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error) {
   pw_error own = { 0 };
   const int status = pw_system_find_column (s, name, c, &own);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "%s: %s", origin, own.text);
@@ -67,12 +67,12 @@ static int outcome_functional (const pw_system *s, const char *text, const char 
                                pw_error *error) {
   *f = outcome_type (&text);
   const int is_event = f->type == PW_EVENTS || f->type == PW_EVENT;
-  int status = pw_column_find (s, is_event ? "t" : text, origin, &f->column, error);
+  int status = outcome_column (s, is_event ? "t" : text, origin, &f->column, error);
   if (f->type == PW_EVENT && f->number < 1) return pw_fail (error, PW_INPUT, "%s: events are counted from 1", origin);
   if (is_event) return outcome_find_events (s, text, origin, f, error);
   if (status == PW_OK || f->type != PW_FINAL || strcmp (text, "events") != 0) return status;
   *error = (pw_error){ 0 }, f->type = PW_EVENTS;
-  return pw_column_find (s, "t", origin, &f->column, error);
+  return outcome_column (s, "t", origin, &f->column, error);
 }
 
 /* The index of a functional, which is added unless it is there; -1 if out of memory. */

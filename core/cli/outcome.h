@@ -20,10 +20,6 @@
   "a column of the table of `run` at the end; its max:, min:, mean:, integral:, rms: or at TIME:, such as " \
   "max:B.Fx; events:ELEMENT, their number, or event:ELEMENT, the time of the first one; or an expression of these"
 
-/* The column of this name; `origin` begins messages ("--of max:B.Fx").  PW_INPUT, with the nearest name, if there is
- * none. */
-int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
-
 /* 1 for work and losses: their rates are known, and they are integrals themselves. */
 static inline int pw_column_is_integrated (pw_column_type type) {
   return type == PW_COLUMN_LEDGER || type == PW_COLUMN_WORK || type == PW_COLUMN_LOSS;

@@ -3,8 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "plot.h"
-#include "report.h"
-#include "states.h"
+#include "unknowns.h"
 
 typedef struct {
   pw_cli_line line;

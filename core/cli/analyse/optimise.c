@@ -3,7 +3,6 @@
  * Local searches begin at several starts: the model's values, and Sobol points (pw_unknowns_starts).  Each search is a
  * task of its own, so that results do not depend on the number of threads.  The best results are then refined. */
 #define _POSIX_C_SOURCE 200809L
-#include <math.h>
 #include <nlopt.h>
 #include <pthread.h>
 #include <stdlib.h>

@@ -3,8 +3,6 @@
 #include <string.h>
 #include "unknowns.h"
 #include "figure.h"
-#include "report.h"
-#include "states.h"
 
 /* A periodic motion found, or a point of a branch. */
 typedef struct {

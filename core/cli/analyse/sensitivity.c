@@ -1,11 +1,9 @@
 /* The command `sensitivity`: derivatives of outputs of a run with respect to parameters and initial values. */
 #define _POSIX_C_SOURCE 200809L
-#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
-#include "report.h"
 #include "unknowns.h"
 
 enum {
@@ -278,13 +276,6 @@ static void sensitivity_json (const void *context, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-/* Adds a cell "NAME [UNIT]", in quotes if the name contains a comma. */
-static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
-  char text[SENSITIVITY_NAME + SENSITIVITY_UNIT];
-  snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
-  (strchr (name, ',') ? pw_text_quoted : pw_text_cell) (t, text);
-}
-
 static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   const sensitivity *cmd = context;
   char unit[SENSITIVITY_UNIT];
@@ -292,11 +283,10 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   pw_text_cell (&t, "t [s]");
   for (int o = 0; o < cmd->outputs.count; o++) {
     if (!pw_outcome_is_final (&cmd->outcomes, o)) continue;
-    sensitivity_cell (&t, cmd->outputs.of[o], pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
+    pw_text_name (&t, cmd->outputs.of[o], pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < cmd->unknowns.count; p++)
-      sensitivity_cell (&t,
-                        PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", cmd->outputs.of[o], cmd->unknowns.list[p].name),
-                        sensitivity_unit (cmd, o, p, unit));
+      pw_text_name (&t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", cmd->outputs.of[o], cmd->unknowns.list[p].name),
+                    sensitivity_unit (cmd, o, p, unit));
   }
   int status = pw_text_line (&t, f, cmd->line.table, error);
   for (int i = 0; i < cmd->outputs.rows && status == PW_OK; i++) {

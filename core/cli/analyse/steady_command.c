@@ -1,10 +1,8 @@
 /* The command `steady`: steady motions, and their branches over a parameter. */
 #include <stdlib.h>
 #include <string.h>
-#include "states.h"
 #include "unknowns.h"
 #include "figure.h"
-#include "report.h"
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {

@@ -10,7 +10,7 @@
 #include <unistd.h>
 #include "figure.h"
 
-const char *const pw_figure_endings[] = { ".dat", ".gp", ".svg", ".png", ".pdf", NULL };
+const char *const pw_figure_endings[FIGURE_ENDINGS + 1] = { ".dat", ".gp", ".svg", ".png", ".pdf", NULL };
 
 int pw_figure_width (const char *text, double *width, pw_error *error) {
   char number[32] = "";
@@ -55,11 +55,10 @@ static int results_old_spelling (pw_cli_line *line, const char *name, int has_ta
 }
 
 int pw_results_open (pw_cli_line *line, const char *name, int has_table, pw_error *error) {
-  static const char *const ending[] = { ".dat", ".gp", ".svg", ".png", ".pdf" };
-  enum { ENDINGS = sizeof ending / sizeof *ending };
-  char text[ENDINGS][40];
-  const char *names[ENDINGS + 1] = { NULL };
-  for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
+  char text[FIGURE_ENDINGS][40];
+  const char *names[FIGURE_ENDINGS + 1] = { NULL };
+  for (int i = 0; i < FIGURE_ENDINGS; i++)
+    snprintf (text[i], sizeof text[i], "%s%s", name, pw_figure_endings[i]), names[i] = text[i];
   if (results_old_spelling (line, name, has_table, error) != PW_OK) return error->status;
   if (!has_table && line->table) return pw_fail (error, PW_INPUT, "-o %.200s: there is no table", line->table);
   pw_use use[] = { PW_CLI_MODEL_USE,
@@ -125,10 +124,6 @@ void pw_figure_text (FILE *f, const char *variable, const char *value) {
   fprintf (f, "%s = ", variable);
   pw_cli_quoted (f, value, "''");
   fputc ('\n', f);
-}
-
-void pw_figure_element (FILE *f, const char *variable, int i, const char *value) {
-  pw_figure_text (f, PW_PRINTED (60, "%s[%d]", variable, i), value);
 }
 
 const char *pw_figure_label (const char *name, const char *unit, char buffer[FIGURE_TITLE]) {

@@ -9,7 +9,8 @@ enum {
   FIGURE_WIDTH = 170, /* [mm]: both columns of a page */
   FIGURE_TITLE = 300, /* bytes of the title, at most */
   FIGURE_NAME = 20,   /* bytes of a name in the label of an axis, at most */
-  FIGURE_PATH = 4096  /* longest path of a file, its end included */
+  FIGURE_PATH = 4096, /* longest path of a file, its end included */
+  FIGURE_ENDINGS = 5
 };
 
 typedef struct {
@@ -20,7 +21,7 @@ typedef struct {
 } pw_figures;
 
 /* ".dat", ".gp", then those of pictures; ended by NULL. */
-extern const char *const pw_figure_endings[];
+extern const char *const pw_figure_endings[FIGURE_ENDINGS + 1];
 
 /* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width
  * unchanged.  PW_INPUT unless it is between 50 and 500 mm. */
@@ -52,9 +53,8 @@ int pw_results_write (pw_cli_line *line, int lines, const void *context,
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
 /* Adds the template and completes the script.  PW_OK or PW_RESOURCE. */
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
-/* Assign a text to VARIABLE; to VARIABLE[i]. */
+/* Assigns a text to a variable. */
 void pw_figure_text (FILE *f, const char *variable, const char *value);
-void pw_figure_element (FILE *f, const char *variable, int i, const char *value);
 /* A name of at most FIGURE_NAME bytes, shortened in the middle if need be. */
 const char *pw_figure_name (const char *name, char buffer[FIGURE_NAME + 4]);
 /* The label of an axis, in a temporary buffer: "NAME [UNIT]", or "NAME" if the unit is "", the name shortened. */

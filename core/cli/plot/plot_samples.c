@@ -402,7 +402,7 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   fprintf (f, "curves = %d\nnumbers = %d\nnumber_column = %d\narray label[%d]\n", tracks->curves, tracks->count,
            tracks->numbers + 2, tracks->curves);
   for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++) /* labels unless there are too many */
-    pw_figure_element (f, "label", i + 1, pw_plot_name (plots, tracks, i));
+    pw_figure_text (f, PW_PRINTED (30, "label[%d]", i + 1), pw_plot_name (plots, tracks, i));
   fputs ("markers = '", f); /* which of the curves, from 0, are paths of markers */
   for (int i = 0; i < tracks->curves && tracks == &plots->wheels; i++)
     if (!pw_plot_rolls (plots, pw_plot_pick (i, tracks->curves, tracks->drawn))) fprintf (f, "%d ", i);
@@ -419,7 +419,8 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   for (int c = 0; c <= FIGURES_COLOURS; c++)
     if (area[c]) fprintf (f, "%d ", c);
   fputs ("'\n", f);
-  for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (plots, &plots->bodies, b));
+  for (int b = 0; b < named; b++)
+    pw_figure_text (f, PW_PRINTED (30, "body[%d]", b + 1), pw_plot_name (plots, &plots->bodies, b));
   return pw_figure_end (o, name, error);
 }
 

@@ -6,8 +6,8 @@
 #include <string.h>
 #include "pinwheel-analysis.h"
 #include "pinwheel-selftest.h"
+#include "cli.h"
 #include "outcome.h"
-#include "report.h"
 
 enum {
   CHECK_COORDINATES = 400, /* above this number computations of cubic cost are omitted */

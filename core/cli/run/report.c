@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "report.h"
+#include "cli.h"
 
 enum {
   REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */

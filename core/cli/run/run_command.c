@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include "report.h"
 #include "motion.h"
 #include "outcome.h"
 #include "pinwheel-analysis.h"

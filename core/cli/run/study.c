@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "report.h"
 #include "study.h"
 
 static int methods_add (pw_study *study, const char *name, pw_error *error) {

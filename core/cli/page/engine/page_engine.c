@@ -5,7 +5,6 @@
 #include <complex.h>
 #include <errno.h>
 #include <lapacke.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "plot.h"
