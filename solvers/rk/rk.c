@@ -269,7 +269,7 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   } else {
     status = pw_run_accelerate (r, t, d->q, v, a, d->lambda);
   }
-  if (status == PW_OK) pw_ledger_rates (r, d->lambda, rate);
+  if (status == PW_OK && r->entries > 0) pw_ledger_rates (r, d->lambda, rate);
   return status;
 }
 

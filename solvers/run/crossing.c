@@ -2,7 +2,7 @@
  *
  * The step is halved as long as a function may become positive within a part: if the parabola through its values at
  * the ends and the middle, raised by its own bend, does.  In the smallest parts the largest value is searched for.  The
- * time is then located between two that differ by round-off, by false position (Illinois), safeguarded by bisection,
+ * time is then located between two that differ by round-off, by inverse parabolas, safeguarded by bisection,
  * so that functions that jump are located, too. */
 #include <float.h>
 #include <math.h>
@@ -39,27 +39,32 @@ static crossing_point crossing_at (pw_crossing_search *x, int i, double t) {
   return (crossing_point){ t, most > 0 || i < 0 ? most : value[i] };
 }
 
-/* Locates the sign change between a (not positive) and b (positive): the first positive time that is found. */
-static double crossing_locate (pw_crossing_search *x, crossing_point a, crossing_point b) {
-  int side = 0; /* which end was kept by the last step of false position */
-  double a_weight = a.value, b_weight = b.value;
-  for (int i = 0; i < 200 && x->status == PW_OK; i++) {
-    const double width = b.t - a.t, middle = a.t + width / 2;
-    if (!(a.t < middle && middle < b.t) || width <= x->width) break;
-    double t = a.t + width * (a_weight / (a_weight - b_weight));
-    if (i % 3 == 2 || !(t > a.t && t < b.t)) t = middle; /* the width is halved at least every third time */
+/* The share of the way from x1 to x2, on either side of the root, at which the inverse parabola through these and x3 is
+ * 0, where it is monotonic; else 1/2 (Chandrupatla 1997, Advances in Engineering Software 28, 145-149). */
+static double crossing_guess (crossing_point x1, crossing_point x2, crossing_point x3) {
+  const double f1 = x1.value, f2 = x2.value, f3 = x3.value;
+  const double xi = (x1.t - x2.t) / (x3.t - x2.t), phi = (f1 - f2) / (f3 - f2);
+  if (!(phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi)) return 0.5;
+  return f1 / (f2 - f1) * f3 / (f2 - f3) + (x3.t - x1.t) / (x2.t - x1.t) * f1 / (f3 - f1) * f2 / (f3 - f2);
+}
+
+/* Locates the sign change between a (not positive) and b (positive), with a third point beside them: the first positive
+ * time that is found. */
+static double crossing_locate (pw_crossing_search *x, crossing_point a, crossing_point b, crossing_point third) {
+  crossing_point last = third.t < a.t ? a : b, other = third.t < a.t ? b : a;
+  while (x->status == PW_OK) {
+    const double length = other.t - last.t, nearest = 0.5 * x->width / fabs (length);
+    const double share = fmin (fmax (crossing_guess (last, other, third), nearest), 1 - nearest);
+    const double low = fmin (last.t, other.t), high = fmax (last.t, other.t), middle = low + (high - low) / 2;
+    if (!(low < middle && middle < high) || high - low <= x->width) break;
+    double t = last.t + share * length;
+    if (!(t > low && t < high)) t = middle;
     const crossing_point p = crossing_at (x, -1, t);
-    if (p.value > 0) {
-      b = p, b_weight = p.value;
-      if (side == 1) a_weight /= 2;
-      side = 1;
-    } else {
-      a = p, a_weight = p.value;
-      if (side == -1) b_weight /= 2;
-      side = -1;
-    }
+    third = last;
+    if ((p.value > 0) != (last.value > 0)) third = other, other = last;
+    last = p;
   }
-  return b.t;
+  return last.value > 0 ? last.t : other.t;
 }
 
 /* Searches a maximum of function i between a and b, first at the vertex of the parabola through a, m and b, then by
@@ -69,7 +74,7 @@ static double crossing_peak (pw_crossing_search *x, int i, crossing_point a, cro
   if (!(bend < 0 && fabs (vertex) < 1) || m.value > 0) return NAN;
   const double t = fmin (fmax (m.t + vertex * (b.t - m.t), a.t), b.t); /* a vertex near an end is rounded */
   const crossing_point before = a, p = vertex == 0 ? m : crossing_at (x, i, t);
-  if (p.value > 0) return crossing_locate (x, p.t < m.t ? before : m, p);
+  if (p.value > 0) return crossing_locate (x, p.t < m.t ? before : m, p, p.t < m.t ? m : b);
   if (p.value > m.value) {
     *(p.t < m.t ? &b : &a) = m;
     m = p;
@@ -78,7 +83,7 @@ static double crossing_peak (pw_crossing_search *x, int i, crossing_point a, cro
     const int left = m.t - a.t > b.t - m.t;
     const double next_t = left ? m.t - CROSSING_GOLDEN * (m.t - a.t) : m.t + CROSSING_GOLDEN * (b.t - m.t);
     const crossing_point next = crossing_at (x, i, next_t);
-    if (next.value > 0) return crossing_locate (x, next.t < m.t ? a : m, next);
+    if (next.value > 0) return crossing_locate (x, next.t < m.t ? a : m, next, next.t < m.t ? m : b);
     if (next.value > m.value) {
       *(left ? &b : &a) = m;
       m = next;
@@ -98,7 +103,7 @@ static double crossing_first (pw_crossing_search *x, double a, const double *at_
   if (x->status != PW_OK) return NAN;
   int possible = 0, straight = 1; /* 1: all that may become positive are monotonic */
   for (int i = 0; i < x->count; i++) {
-    const double bend = fabs (at_a[i] - 2 * at_m[i] + at_b[i]);
+    const double bend = isnan (at_a[i]) ? 0 : fabs (at_a[i] - 2 * at_m[i] + at_b[i]);
     if (!(fmax (at_a[i], fmax (at_m[i], at_b[i])) + bend > 0)) continue;
     possible = 1;
     straight &= bend < 0.1 * fabs (at_b[i] - at_a[i]);
@@ -116,7 +121,8 @@ static double crossing_first (pw_crossing_search *x, double a, const double *at_
     if (!isnan (peak)) return peak;
   }
   const crossing_point before = { a, crossing_most (x, at_a) }, between = { m, middle }, after = { b, most };
-  return middle > 0 ? crossing_locate (x, before, between) : most > 0 ? crossing_locate (x, between, after) : NAN;
+  if (middle > 0) return crossing_locate (x, before, between, after);
+  return most > 0 ? crossing_locate (x, between, after, before) : NAN;
 }
 
 double pw_first_crossing (pw_crossing_search *x, double a, const double *at_a, double b, const double *at_b) {

@@ -138,6 +138,16 @@ static int events_at (void *context, double t, double *value, pw_error *error) {
   return status == PW_OK && r->couplings > 0 && r->coupling_lost ? events_fail_friction (r, t, error) : status;
 }
 
+/* The same without the ledger, of which only the state reached needs a sample. */
+static int events_search_at (void *context, double t, double *value, pw_error *error) {
+  pw_run *r = context;
+  const int entries = r->entries, ledger = r->settings.ledger;
+  r->entries = r->settings.ledger = 0;
+  const int status = events_at (r, t, value, error);
+  r->entries = entries, r->settings.ledger = ledger;
+  return status;
+}
+
 /* Marks functions of u that have left their root. */
 static void events_arm (pw_run *r, const double *value) {
   pw_events *x = r->events;
@@ -233,6 +243,13 @@ static int events_far (const pw_run *r, double t0) {
   return 1;
 }
 
+/* The functions at the beginning of the last step; NaN: of u that is at its root there, and leaves it. */
+static const double *events_left (pw_events *x) {
+  for (int i = 0; i < 2 * x->count; i++)
+    x->now[i] = i % 2 == 0 && x->mode[i / 2] && !x->armed[i / 2] && x->end[i] < 0 ? NAN : x->start[i];
+  return x->now;
+}
+
 /* The longest next adaptive step: multipliers that signals of time change must be resolved even where nothing moves,
  * and an error estimate would permit any step.  Multistep methods grow by up to 10, and lose their order if they are
  * interrupted more often. */
@@ -269,15 +286,15 @@ static int events_refine (pw_run *r, pw_crossing_search *search, double t0, doub
     search->status = events_at (r, *root, x->now, search->error);
     const double first = search->status == PW_OK ? pw_first_crossing (search, t, x->start, *root, x->now) : NAN;
     if (!isnan (first)) *root = first;
-    return search->status;
+    return search->status == PW_OK ? events_at (r, *root, x->now, search->error) : search->status;
   }
   return PW_OK;
 }
 
-/* Makes the sample at t the state reached. */
+/* Makes the sample at t, in x->now if it is the last one, the state reached. */
 static int events_stop_at (pw_run *r, double t, pw_error *error) {
   pw_events *x = r->events;
-  int status = events_at (r, t, x->now, error);
+  int status = t == r->located ? PW_OK : events_at (r, t, x->now, error);
   if (status != PW_OK) return status;
   events_trigger (r, x->now);
   x->pending = 1, x->start_t = NAN;
@@ -295,7 +312,7 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
   pw_events *x = r->events;
   const size_t bytes = 2 * (size_t)x->count * sizeof *x->start;
   pw_crossing_search search = { .count = 2 * x->count,
-                                .at = events_at,
+                                .at = events_search_at,
                                 .context = r,
                                 .memory = x->memory,
                                 .width = 4 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time),
@@ -305,7 +322,7 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
   x->at_end = 0;
   double root = NAN;
   if (status == PW_OK && (events_trigger (r, x->end) || !events_far (r, t0)))
-    root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
+    root = pw_first_crossing (&search, t0, events_left (x), r->t, x->end);
   if (status == PW_OK) status = search.status;
   if (status == PW_OK && !isnan (root)) {
     status = events_at (r, root, x->now, error);
