@@ -163,9 +163,14 @@ static int events_trigger (pw_run *r, const double *value) {
   return any;
 }
 
-/* Projects the state reached onto the equations that hold so far: not all samples satisfy them exactly. */
+/* Projects the state reached onto the equations that hold so far, unless it satisfies them to round-off: not all
+ * samples do. */
 static int events_project (pw_run *r, pw_error *error) {
   pw_projector p;
+  pw_residuals now;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  pw_evaluate_residuals (r->w, r->enforced, &now);
+  if (r->redundant == 0 && now.position <= PW_RESIDUAL_CONVERGED && now.velocity <= PW_RESIDUAL_CONVERGED) return PW_OK;
   int status = pw_projector_open (&p, r, NULL, NULL, error);
   if (status != PW_OK) return status;
   double before = 0; /* a sample may have moved the bodies of the workspace */
