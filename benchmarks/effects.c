@@ -5,7 +5,8 @@
  *
  * First the EzyRoller alone, with the libpinwheel to which this program is linked and with the one in FOLDER, which
  * has only the element types of the EzyRoller: the counts must be equal, otherwise the exit status is 1.  Then the
- * EzyRoller with one further effect at a time.  Element types are found by name: it runs with both libraries. */
+ * EzyRoller with one further effect at a time, and what an event costs: wheel A, with a grip, slides and holds again.
+ * Element types are found by name: it runs with both libraries. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +16,8 @@ enum {
   EFFECTS_POOL = 64,     /* states that are evaluated */
   EFFECTS_SPACING = 200, /* steps between them */
   EFFECTS_ROUNDS = 10,   /* evaluations of each */
-  EFFECTS_COORDS = 12    /* 3 bodies, or 2 and a spin angle; 3 entries of the ground */
+  EFFECTS_COORDS = 12,   /* 3 bodies, or 2 and a spin angle; 3 entries of the ground */
+  EFFECTS_STEPS = 2100   /* of a run with events */
 };
 
 /* ---- Scenes ---- */
@@ -96,6 +98,10 @@ static void effects_welded (pw_model *m) {
   effects_add (m, "weld", &(pw_weld){ .name = "S", .body = { "frame", "seat" }, .at = { { 0, 0 }, { -0.1, 0 } } });
 }
 
+static void effects_grip (pw_model *m) {
+  effects_add (m, "wheel", &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 }, .grip = { .constant = 0.03 } });
+}
+
 static const struct {
   const char *key, *what;
   void (*add) (pw_model *m);
@@ -109,6 +115,7 @@ static const struct {
   { "rolling-wheel", "a driven rolling-wheel in place of wheel A", effects_rolling },
   { "pin", "a third body, pinned to the frame", effects_pinned },
   { "weld", "a third body, welded to the frame", effects_welded },
+  { "grip", "a grip of wheel A, which holds", effects_grip },
 };
 enum { EFFECTS_SCENES = sizeof effects_scene / sizeof *effects_scene };
 
@@ -164,7 +171,7 @@ static long effects_evaluate (void *context, long n) {
   return n;
 }
 
-static pw_run *effects_open (const char *key, int massless, pw_system **system) {
+static pw_run *effects_open (const char *key, int massless, double step, pw_system **system) {
   pw_error e = { 0 };
   int scene = 0;
   while (scene < EFFECTS_SCENES && strcmp (effects_scene[scene].key, key) != 0) scene++;
@@ -172,7 +179,7 @@ static pw_run *effects_open (const char *key, int massless, pw_system **system) 
   pw_model *m = pw_model_new ("effects", &effects_table, &e);
   if (m) pw_model_set (m, "scene", scene, &e), pw_model_set (m, "massless", massless, &e);
   pw_system *s = m && pw_model_build (m, &e) == PW_OK ? pw_system_compile (m, &e) : NULL;
-  pw_run *r = s ? pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 }, &e) : NULL;
+  pw_run *r = s ? pw_run_open (s, "rk4+projection", &(pw_settings){ .step = step, .span = 10 }, &e) : NULL;
   if (r == NULL) engine_die (key, e.text);
   pw_model_free (m);
   *system = s;
@@ -189,7 +196,7 @@ static void effects_close (pw_run *r, pw_system *s) {
 static void effects_fill (effects_data *d, int massless) {
   pw_error e = { 0 };
   pw_system *s;
-  pw_run *alone = effects_open ("none", massless, &s);
+  pw_run *alone = effects_open ("none", massless, 1e-3, &s);
   for (int k = 0; k < EFFECTS_POOL; k++) {
     for (int i = 0; i < EFFECTS_SPACING && e.status == PW_OK; i++) pw_run_advance (alone, 100, &e);
     d->t[k] = alone->t;
@@ -206,11 +213,62 @@ static void effects_fill (effects_data *d, int massless) {
 static int effects_child (const char *key, const char *steering) {
   static effects_data d;
   int massless = strcmp (steering, effects_steering[1]) == 0;
-  d.run = effects_open (key, massless, &d.system);
+  d.run = effects_open (key, massless, 1e-3, &d.system);
   effects_fill (&d, massless);
   engine_counted (&(timing_work){ effects_evaluate, &d }, EFFECTS_ROUNDS * EFFECTS_POOL);
   effects_close (d.run, d.system);
   return 0;
+}
+
+/* ---- Events: instructions of the two steps that find an event and restart after it, less those of two others ---- */
+
+static long effects_step (void *context, long n) {
+  pw_error e = { 0 };
+  if (pw_run_advance (context, 20, &e) != PW_OK) engine_die ("a step with an event", e.text);
+  return n;
+}
+
+/* Marks the steps of a run that find an event, or restart after one.  Returns the number of events. */
+static long effects_find (int steering, unsigned char *marked) {
+  pw_system *s;
+  pw_run *r = effects_open ("grip", steering, 1e-2, &s);
+  long known = r->event_count, events = -known;
+  for (int i = 0; i < EFFECTS_STEPS && pw_run_time (r) < 20; i++, known = r->event_count) {
+    effects_step (r, 1);
+    if (r->event_count > known) marked[i] = marked[i - 1] = 1;
+  }
+  events += known;
+  effects_close (r, s);
+  return events;
+}
+
+/* The process that callgrind counts: of a run with events the marked steps, or the others. */
+static int effects_event_child (int marked_ones, int steering) {
+  static unsigned char marked[EFFECTS_STEPS];
+  pw_system *s;
+  effects_find (steering, marked);
+  pw_run *r = effects_open ("grip", steering, 1e-2, &s);
+  for (int i = 0; i < EFFECTS_STEPS && pw_run_time (r) < 20; i++)
+    marked[i] == marked_ones ? engine_counted (&(timing_work){ effects_step, r }, 1) : effects_step (r, 1);
+  effects_close (r, s);
+  return 0;
+}
+
+static void effects_event (const char *program) {
+  printf ("\nan event, at which wheel A slides or holds; the restart of the method; evaluations of an ordinary step\n");
+  for (int steering = 0; steering < 2; steering++) {
+    unsigned char marked[EFFECTS_STEPS] = { 0 };
+    const long events = effects_find (steering, marked);
+    long steps = 0, ordinary = 0;
+    for (int i = 0; i < EFFECTS_STEPS; i++) *(marked[i] ? &steps : &ordinary) += 1;
+    const char *name = effects_steering[steering];
+    const double step = engine_count (program, "ordinary", name, "pw_run_advance") / (double)ordinary;
+    const double all = engine_count (program, "event", name, "pw_run_advance") - (double)steps * step;
+    const double restart = engine_count (program, "event", name, "pw_run_renew") / (double)events, evaluation = step / 4;
+    const double rest = all / (double)events - restart;
+    printf ("%-50s %10.0f %10.0f\n", name, rest, restart);
+    printf ("%-50s %10.1f %10.1f\n", "  in evaluations", rest / evaluation, restart / evaluation);
+  }
 }
 
 static int effects_list_kinds (void) {
@@ -260,7 +318,11 @@ static void effects_other_library (const char *program, const char *folder, doub
 int main (int argc, char **argv) {
   double all[2], few[2];
   int equal = 1;
-  if (argc == 4 && strcmp (argv[1], "--count") == 0) return effects_child (argv[2], argv[3]);
+  if (argc == 4 && strcmp (argv[1], "--count") == 0) {
+    const int ordinary = strcmp (argv[2], "ordinary") == 0, massless = strcmp (argv[3], effects_steering[1]) == 0;
+    if (ordinary || strcmp (argv[2], "event") == 0) return effects_event_child (!ordinary, massless);
+    return effects_child (argv[2], argv[3]);
+  }
   if (argc == 2 && strcmp (argv[1], "--kinds") == 0) return effects_list_kinds ();
   printf ("instructions per evaluation, steering with mass and without; difference to the EzyRoller alone\n\n");
   effects_library (argv[0], "all kinds", all);
@@ -275,5 +337,6 @@ int main (int argc, char **argv) {
                         effects_count (argv[0], effects_scene[i].key, 1) };
     effects_print (effects_scene[i].what, count, all);
   }
+  effects_event (argv[0]);
   return !equal;
 }
