@@ -99,7 +99,8 @@ static void effects_welded (pw_model *m) {
 }
 
 static void effects_grip (pw_model *m) {
-  effects_add (m, "wheel", &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 }, .grip = { .constant = 0.03 } });
+  effects_add (m, "wheel",
+               &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 }, .grip = { .constant = 0.03 } });
 }
 
 static const struct {
@@ -264,7 +265,8 @@ static void effects_event (const char *program) {
     const char *name = effects_steering[steering];
     const double step = engine_count (program, "ordinary", name, "pw_run_advance") / (double)ordinary;
     const double all = engine_count (program, "event", name, "pw_run_advance") - (double)steps * step;
-    const double restart = engine_count (program, "event", name, "pw_run_renew") / (double)events, evaluation = step / 4;
+    const double restart = engine_count (program, "event", name, "pw_run_renew") / (double)events,
+                 evaluation = step / 4;
     const double rest = all / (double)events - restart;
     printf ("%-50s %10.0f %10.0f\n", name, rest, restart);
     printf ("%-50s %10.1f %10.1f\n", "  in evaluations", rest / evaluation, restart / evaluation);

@@ -39,10 +39,10 @@ static crossing_point crossing_at (pw_crossing_search *x, int i, double t) {
   return (crossing_point){ t, most > 0 || i < 0 ? most : value[i] };
 }
 
-/* The share of the way from x1 to x2, on either side of the root, at which the inverse parabola through these and x3 is
- * 0, where it is monotonic; else 1/2 (Chandrupatla 1997, Advances in Engineering Software 28, 145-149). */
-static double crossing_guess (crossing_point x1, crossing_point x2, crossing_point x3) {
-  const double f1 = x1.value, f2 = x2.value, f3 = x3.value;
+/* The share of the way from x1 to x2, on either side of the root, at which the inverse parabola through these and x3 has
+ * a value, where it is monotonic; else 1/2 (Chandrupatla 1997, Advances in Engineering Software 28, 145-149). */
+static double crossing_guess (crossing_point x1, crossing_point x2, crossing_point x3, double value) {
+  const double f1 = x1.value - value, f2 = x2.value - value, f3 = x3.value - value;
   const double xi = (x1.t - x2.t) / (x3.t - x2.t), phi = (f1 - f2) / (f3 - f2);
   if (!(phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi)) return 0.5;
   return f1 / (f2 - f1) * f3 / (f2 - f3) + (x3.t - x1.t) / (x2.t - x1.t) * f1 / (f3 - f1) * f2 / (f3 - f2);
@@ -52,9 +52,9 @@ static double crossing_guess (crossing_point x1, crossing_point x2, crossing_poi
  * time that is found. */
 static double crossing_locate (pw_crossing_search *x, crossing_point a, crossing_point b, crossing_point third) {
   crossing_point last = third.t < a.t ? a : b, other = third.t < a.t ? b : a;
-  while (x->status == PW_OK) {
+  while (x->status == PW_OK && !(last.value > 0 && last.value <= x->small)) {
     const double length = other.t - last.t, nearest = 0.5 * x->width / fabs (length);
-    const double share = fmin (fmax (crossing_guess (last, other, third), nearest), 1 - nearest);
+    const double share = fmin (fmax (crossing_guess (last, other, third, x->small / 2), nearest), 1 - nearest);
     const double low = fmin (last.t, other.t), high = fmax (last.t, other.t), middle = low + (high - low) / 2;
     if (!(low < middle && middle < high) || high - low <= x->width) break;
     double t = last.t + share * length;
@@ -126,7 +126,10 @@ static double crossing_first (pw_crossing_search *x, double a, const double *at_
 }
 
 double pw_first_crossing (pw_crossing_search *x, double a, const double *at_a, double b, const double *at_b) {
-  return crossing_first (x, a, at_a, b, at_b, PW_CROSSING_DEPTH);
+  if (x->at_before == NULL) return crossing_first (x, a, at_a, b, at_b, PW_CROSSING_DEPTH);
+  const crossing_point first = { a, crossing_most (x, at_a) }, last = { b, crossing_most (x, at_b) };
+  const crossing_point third = { x->before, crossing_most (x, x->at_before) };
+  return last.value > 0 ? crossing_locate (x, first, last, third) : NAN;
 }
 
 /* ---- Conditions on samples ---- */

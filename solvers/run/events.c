@@ -23,6 +23,7 @@
 /* Distance of a multiplier [limits], or of u [units], from the boundary of a mode that is not round-off, nor that of
  * initial values with 6 digits. */
 #define EVENTS_BOUNDARY 1e-6
+#define EVENTS_STRAIGHT 40 /* bends by which a function increases in a step that surely has one root at most */
 #define EVENTS_PARTED 1e-9 /* u [units] of an equation that no longer depends on those that hold: more than round-off */
 enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
 
@@ -240,11 +241,14 @@ static double events_bend (const pw_run *r, double t0, int i) {
   return fabs ((x->end[i] - x->start[i]) / h - (x->start[i] - x->previous[i]) / before) / (h + before) * h * h / 2;
 }
 
-/* 1 if no function comes near its root in the last step, from t0. */
-static int events_far (const pw_run *r, double t0) {
+/* 1 if no function comes near its root in the last step, from t0, but those that increase by more than `straight`
+ * bends.  One that falls by more than four bends is largest at t0: a parabola, by more than two. */
+static int events_far (const pw_run *r, double t0, double straight) {
   const pw_events *x = r->events;
-  for (int i = 0; i < 2 * x->count; i++)
-    if (!(fmax (x->start[i], x->end[i]) + 4 * events_bend (r, t0, i) < 0)) return 0;
+  for (int i = 0; i < 2 * x->count; i++) {
+    const double bend = events_bend (r, t0, i), change = x->end[i] - x->start[i];
+    if (!(fmax (x->start[i], x->end[i]) + 4 * bend < 0 || -change > 4 * bend || change > straight * bend)) return 0;
+  }
   return 1;
 }
 
@@ -321,13 +325,17 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
                                 .context = r,
                                 .memory = x->memory,
                                 .width = 4 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time),
+                                .small = EVENTS_ROUND_OFF / 4,
                                 .error = error };
   x->at_end = r->t < r->breakpoint && events_knows_multipliers (r), x->samples = 0;
   int status = events_at (r, r->t, x->end, error);
   x->at_end = 0;
   double root = NAN;
-  if (status == PW_OK && (events_trigger (r, x->end) || !events_far (r, t0)))
+  if (status == PW_OK && (events_trigger (r, x->end) || !events_far (r, t0, INFINITY))) {
+    if (events_far (r, t0, EVENTS_STRAIGHT)) search.before = x->previous_t, search.at_before = x->previous;
     root = pw_first_crossing (&search, t0, events_left (x), r->t, x->end);
+  }
+  search.at_before = NULL;
   if (status == PW_OK) status = search.status;
   if (status == PW_OK && !isnan (root)) {
     status = events_at (r, root, x->now, error);
