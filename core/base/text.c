@@ -33,7 +33,10 @@ int pw_control (const char *text) {
 
 int pw_is_text (const char *text) {
   for (int n; *text; text += n)
-    if ((n = pw_utf8_size (text)) == 0 || pw_control (text)) return 0;
+    if (*text >= ' ' && *text < 0x7F)
+      n = 1; /* as most are */
+    else if ((n = pw_utf8_size (text)) == 0 || pw_control (text))
+      return 0;
   return 1;
 }
 
@@ -55,6 +58,24 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) {
   va_start (arguments, format);
   vsnprintf (buffer, size, format, arguments);
   va_end (arguments);
+  return buffer;
+}
+
+char *pw_print_part (char *buffer, size_t size, const char *text, size_t n) {
+  if (n > size - 1) n = size - 1;
+  memcpy (buffer, text, n);
+  buffer[n] = '\0';
+  return buffer;
+}
+
+char *pw_join (char *buffer, size_t size, const char *first, ...) {
+  char *end = buffer, *last = buffer + size - 1;
+  va_list more;
+  va_start (more, first);
+  for (const char *text = first; text; text = va_arg (more, const char *))
+    for (; *text && end < last; text++) *end++ = *text;
+  va_end (more);
+  *end = '\0';
   return buffer;
 }
 
@@ -121,11 +142,13 @@ const char *pw_nearest_text (pw_nearest *n) {
 
 int pw_find_name (const void *table, size_t entry_size, const char *name, char hint[PW_HINT]) {
   pw_nearest near = { .sought = name };
-  const char *known;
-  for (int i = 0; table && (known = *(const char *const *)(const void *)((const char *)table + (size_t)i * entry_size));
-       i++) {
-    if (strcmp (known, name) == 0) return i;
-    pw_nearest_try (&near, known);
+  for (int pass = 0; pass < 2 && table; pass++) { /* suggestions, which cost more, are for unknown names only */
+    const char *entry = table, *known;
+    for (int i = 0; (known = *(const char *const *)(const void *)entry); i++, entry += entry_size)
+      if (pass)
+        pw_nearest_try (&near, known);
+      else if (strcmp (known, name) == 0)
+        return i;
   }
   strcpy (hint, pw_nearest_text (&near));
   return -1;

@@ -478,15 +478,18 @@ pw_state_change pw_cli_state_change (const pw_system *system, const pw_initial_r
 
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
   const pw_initial_report *initial = pw_run_initial (r);
+  const int n = pw_system_coordinates (s);
   double largest = 0;
-  for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
+  int state = -1;
+  for (int i = 0; i < 2 * n; i++) {
     if (!pw_initial_given (initial, i) || !pw_initial_moved (s, initial, i)) continue;
-    const pw_state_change c = pw_cli_state_change (s, initial, i);
-    if (!(fabs (c.consistent - c.given) > largest)) continue;
-    largest = fabs (c.consistent - c.given);
-    pw_print (text, PW_CHANGE_TEXT, "%s from %s to %s %s", c.name, PW_DIGITS (c.given, 10),
-              PW_DIGITS (c.consistent, 10), c.unit);
+    const double change = i < n ? initial->q[i] - initial->q_given[i] : initial->v[i - n] - initial->v_given[i - n];
+    if (fabs (change) > largest) largest = fabs (change), state = i;
   }
+  if (state < 0) return 0;
+  const pw_state_change c = pw_cli_state_change (s, initial, state);
+  pw_print (text, PW_CHANGE_TEXT, "%s from %s to %s %s", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10),
+            c.unit);
   return largest;
 }
 

@@ -123,9 +123,9 @@ const pw_expression_function pw_expression_functions[] = {
 };
 
 int pw_expression_find_function (const char *name) {
-  int i = 0;
-  while (pw_expression_functions[i].name && strcmp (pw_expression_functions[i].name, name) != 0) i++;
-  return pw_expression_functions[i].name ? i : -1;
+  for (int i = 0; pw_expression_functions[i].name; i++)
+    if (*pw_expression_functions[i].name == *name && strcmp (pw_expression_functions[i].name, name) == 0) return i;
+  return -1;
 }
 
 const char *const pw_path_functions[] = { "s", "x", "y", "heading", "curvature", "offset", NULL };

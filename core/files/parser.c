@@ -81,7 +81,7 @@ const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_
     size_t n = name_size (p), number = n ? 0 : pw_number_size (p);
     *rest += n ? n : number ? number : 1;
     if (n == 0) continue;
-    snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
+    pw_print_part (name, PW_EXPRESSION_NAME, p, n);
     return p;
   }
   return NULL;
@@ -200,7 +200,7 @@ static void parser_next (parser *p) {
   p->type = name ? 'n' : number ? '0' : *word;
   if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
   for (const parser_operator *o = parser_operators; o->name && !p->symbol; o++)
-    if (strncmp (word, o->name, strlen (o->name)) == 0) p->symbol = o;
+    if (*word == *o->name && strncmp (word, o->name, strlen (o->name)) == 0) p->symbol = o;
   p->type = 'o';
   if (p->symbol == NULL && *word == '=')
     parser_fail (p, p->at, "\"=\" would assign; equality is written ==");
@@ -440,13 +440,14 @@ static parser_part parser_operand (parser *p) {
   if (p->status != PW_OK) return (parser_part){ 0 };
   if (p->type == '0') {
     double value = 0;
-    if (pw_read_number (PW_PRINTED (PARSER_MAX_LENGTH + 1, "%.*s", (int)p->size, p->text + p->at), &value) != PW_OK)
-      p->status = PW_RESOURCE;
+    char digits[PARSER_MAX_LENGTH + 1];
+    pw_print_part (digits, sizeof digits, p->text + p->at, p->size);
+    if (pw_read_number (digits, &value) != PW_OK) p->status = PW_RESOURCE;
     return parser_leaf (p, PW_OP_CONSTANT, 0, value);
   }
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
-  const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
+  const char *name = pw_print_part ((char[PW_EXPRESSION_NAME]){ 0 }, PW_EXPRESSION_NAME, p->text + p->at, p->size);
   if (strchr (name, '.') && (parser_is_call (p) || pw_scope_path (p->scope, name))) return parser_path (p, name);
   int index = pw_expression_find_function (name);
   const pw_expression_function *f = index < 0 ? NULL : &pw_expression_functions[index];

@@ -67,13 +67,13 @@ static const pw_element_batch *query_find_element (const pw_system *s, size_t me
 char *pw_member_name (const pw_system *s, const pw_element_batch *k, int e, const char *what, char *buffer,
                       size_t size) {
   const char *body = k->kind->each_body ? s->body_name[k->b.body[e]] : "";
-  return pw_print (buffer, size, "%s%s%s%s%s", k->name[e], *body ? "." : "", body, *what ? "." : "", what);
+  return pw_join (buffer, size, k->name[e], *body ? "." : "", body, *what ? "." : "", what, NULL);
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies)
-    return pw_print (buffer, size, "%s.%s", s->body_name[j / 3], query_states[3 * velocity + j % 3]);
+    return pw_join (buffer, size, s->body_name[j / 3], ".", query_states[3 * velocity + j % 3], NULL);
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
   const pw_quantity *x = &k->kind->coordinate[n];
   return pw_member_name (s, k, e, velocity ? x->rate : x->name, buffer, size);
