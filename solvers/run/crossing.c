@@ -39,8 +39,8 @@ static crossing_point crossing_at (pw_crossing_search *x, int i, double t) {
   return (crossing_point){ t, most > 0 || i < 0 ? most : value[i] };
 }
 
-/* The share of the way from x1 to x2, on either side of the root, at which the inverse parabola through these and x3 has
- * a value, where it is monotonic; else 1/2 (Chandrupatla 1997, Advances in Engineering Software 28, 145-149). */
+/* The share of the way from x1 to x2, on either side of the root, at which the inverse parabola through these and x3
+ * has a value, where it is monotonic; else 1/2 (Chandrupatla 1997, Advances in Engineering Software 28, 145-149). */
 static double crossing_guess (crossing_point x1, crossing_point x2, crossing_point x3, double value) {
   const double f1 = x1.value - value, f2 = x2.value - value, f3 = x3.value - value;
   const double xi = (x1.t - x2.t) / (x3.t - x2.t), phi = (f1 - f2) / (f3 - f2);
