@@ -19,6 +19,7 @@
 /* By which a limit that is reached is narrowed: the multiplier of the decision, of a projected state, differs from that
  * of the sample by round-off, about 1e-12 of the limit, which must not undo the event. */
 #define MODES_TIGHTER 1e-10
+enum { MODES_IMPACTS = 10 }; /* most at one instant, after which all their equations hold */
 
 /* ---- Modes of the run ---- */
 
@@ -372,7 +373,7 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
     const double u = x->u_before[i] / x->unit[i];
     const int one_sided = pw_is_one_sided (&x->limit[i]);
     const int hits = x->mode[i] && x->mode[i] * u < -PW_MODES_SMALL;
-    x->impulse[i] = 0, x->rests[i] = 0;
+    x->rests[i] = 0;
     if (x->partner[i] >= 0 && x->place[x->partner[i]] >= 0) pw_modes_add (x, i, x->limit[i].least, x->limit[i].most, 0);
     if (!one_sided || modes_open (r, i, g[i]) || (x->mode[i] && x->mode[i] * u > PW_MODES_SMALL)) continue;
     *any |= hits;
@@ -392,9 +393,27 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   if (pw_update_velocities (r->w, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   pw_modes_end_impact (r, r->v);
   for (int k = 0; k < x->d.n; k++) {
-    x->impulse[x->d.list[k]] = -x->d.x[k];
+    x->impulse[x->d.list[k]] -= x->d.x[k];
     x->struck[x->d.list[k]] |= x->d.x[k] != 0;
     x->rests[x->d.list[k]] = fabs (x->u[x->d.list[k]]) <= PW_MODES_SMALL * x->unit[x->d.list[k]];
+  }
+  return PW_OK;
+}
+
+/* Impacts, and those that follow from them at the same instant; *any: 1 if there are.  After many, their equations hold
+ * (impact_try). */
+static int decide_all_impacts (pw_run *r, const double *g, int *any, pw_error *error) {
+  pw_events *x = r->events;
+  int more = 1;
+  *any = 0;
+  memset (x->impulse, 0, (size_t)x->count * sizeof *x->impulse);
+  for (int pass = 0; more; pass++) {
+    if (pass > MODES_IMPACTS + x->count)
+      return pw_fail (error, PW_METHOD, "t = %.6g s: impacts follow each other endlessly", r->t);
+    if (pass == MODES_IMPACTS) x->fell = 1;
+    const int status = decide_impacts (r, g, &more, error);
+    if (status != PW_OK) return status;
+    *any |= more;
   }
   return PW_OK;
 }
@@ -509,7 +528,7 @@ int pw_modes_decide (pw_run *r, int jumps, pw_error *error) {
   }
   pw_modes_set_limits (r);
   pw_modes_u (r, r->v, 1, x->now);
-  int status = decide_impacts (r, x->now, &impacts, error);
+  int status = decide_all_impacts (r, x->now, &impacts, error);
   if (status != PW_OK) return status;
   decide_list (r, x->now, jumps || impacts);
   status = decide_modes (r, error);

@@ -43,7 +43,7 @@ static int events_read (void) {
       assert_int_equal (sscanf (line, "loss %lf", &p->loss), 1);
   }
   fclose (f);
-  assert_int_equal (events_count, 36);
+  assert_int_equal (events_count, 37);
   return 0;
 }
 
