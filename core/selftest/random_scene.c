@@ -8,8 +8,6 @@ double pw_random_between (pw_random *r, double low, double high) {
   return low + (high - low) * ldexp ((double)(pw_random_bits (&r->state) >> 11), -53);
 }
 
-/* ---- Random definitions ---- */
-
 typedef struct {
   const pw_kind *kind;
   pw_random *random;
@@ -23,29 +21,21 @@ static double scene_number (pw_random *r, pw_domain domain) {
   return domain == PW_REAL && pw_random_between (r, 0, 1) < 0.5 ? -size : size;
 }
 
-static pw_signal scene_signal (pw_random *r) {
-  pw_signal s = { .type = PW_HARMONIC };
-  s.harmonic.amplitude = pw_random_between (r, 0.5, 1.5);
-  s.harmonic.omega = pw_random_between (r, 0.5, 2);
-  s.harmonic.phase = pw_random_between (r, -3, 3);
-  s.harmonic.offset = pw_random_between (r, -1, 1);
-  return s;
-}
-
-static int scene_choice (pw_random *r, const pw_field *f) {
-  int choices = 0;
-  while (f->choices[choices]) choices++;
-  return (int)floor (pw_random_between (r, 0, choices));
-}
-
 /* One value of a field.  Points are near the centre of mass, so that points of distant bodies do not coincide. */
 static void scene_value (pw_random *r, const pw_field *f, void *at) {
   int is_default = f->type == PW_NUMBER && f->domain == PW_REAL && !f->required && pw_random_between (r, 0, 1) < 0.2;
   if (f->type == PW_NUMBER) *(double *)at = is_default ? 0 : scene_number (r, f->domain);
-  if (f->type == PW_SIGNAL && !f->limit) *(pw_signal *)at = scene_signal (r);
+  if (f->type == PW_SIGNAL && !f->limit) {
+    pw_harmonic *h = &((pw_signal *)at)->harmonic;
+    ((pw_signal *)at)->type = PW_HARMONIC;
+    h->amplitude = pw_random_between (r, 0.5, 1.5), h->omega = pw_random_between (r, 0.5, 2);
+    h->phase = pw_random_between (r, -3, 3), h->offset = pw_random_between (r, -1, 1);
+  }
   if (f->limit && !f[-1].limit)
     ((pw_signal *)at)->constant = scene_number (r, PW_NONNEGATIVE); /* that while sliding: 0 */
-  if (f->type == PW_CHOICE) *(int *)at = scene_choice (r, f);
+  int choices = 0;
+  while (f->type == PW_CHOICE && f->choices[choices]) choices++;
+  if (f->type == PW_CHOICE) *(int *)at = (int)floor (pw_random_between (r, 0, choices));
   for (int i = 0; i < 2 && f->type == PW_POINT; i++) ((double *)at)[i] = pw_random_between (r, -0.6, 0.6);
   for (int i = 0; i < 2 && f->type == PW_VECTOR; i++) ((double *)at)[i] = scene_number (r, PW_REAL);
 }

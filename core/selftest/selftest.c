@@ -7,8 +7,6 @@
 #include <string.h>
 #include "selftest.h"
 
-/* ---- Checks ---- */
-
 static const struct {
   const char *name, *about; /* as in pw_selftest_check */
 } selftest_checks[] = {
@@ -61,13 +59,12 @@ static void selftest_record (pw_selftest_report *r, const char *check, double er
   snprintf (c->where, sizeof c->where, "%s", where);
 }
 
-/* ---- The probe: the batch of one element type in a scene, at a state that is moved to compute differences ---- */
-
 enum { PROBE_GUARD = 8 }; /* guard numbers after an array, which must not change */
 
 /* Moves by h: along dq; along dv; in time, by h tau; in time and along the motion q + v s + a s^2 / 2, s = h tau. */
 typedef enum { PROBE_Q, PROBE_V, PROBE_TIME, PROBE_MOTION } probe_move;
 
+/* The batch of one element type in a scene, at a state that is moved to compute differences. */
 typedef struct {
   const pw_kind *kind;
   const pw_system *s;
@@ -174,7 +171,6 @@ static void probe_multiply (const probe *x, const double *block, int rows, const
     }
 }
 
-/* out = J vector */
 static void probe_multiply_J (probe *x, const double *vector, double *out) {
   probe_J (x, x->J);
   memset (out, 0, (size_t)(x->elements * x->rows) * sizeof *out);
@@ -196,8 +192,6 @@ static void probe_drift (probe *x, double *out) {
   probe_multiply_J (x, x->v_now, out);
   for (int i = 0; i < x->elements * x->rows; i++) out[i] -= x->eta[i];
 }
-
-/* ---- In random scenes ---- */
 
 /* Central differences with a step of about eps^(1/3) = 6e-6 have an error of the order eps^(2/3) times the function's
  * size, from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are
@@ -466,19 +460,15 @@ static void selftest_power_of (probe *x, int e) {
     selftest_record (x->report, "loss", fmax (-loss[e], 0), 0, "exact", where);
 }
 
-/* 1 if the velocity constraints of the element need not hold: their multipliers then have power. */
-static int selftest_slides (const probe *x, int e) {
-  int limited = 0;
-  for (int r = 0; r < x->rows; r++) limited |= pw_is_limited (x->s, x->batch->row + e * x->rows + r);
-  return limited && x->kind->level == PW_NONHOLONOMIC;
-}
-
 static void selftest_power (probe *x) {
   double v[PW_SCENE_COORDS];
   if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss && !x->kind->limits) return;
   for (int e = 0; e < x->elements; e++) {
+    int slides = 0; /* velocity constraints that need not hold: their multipliers then have power */
+    for (int r = 0; r < x->rows && x->kind->level == PW_NONHOLONOMIC; r++)
+      slides |= pw_is_limited (x->s, x->batch->row + e * x->rows + r);
     memcpy (v, x->v, (size_t)x->s->coords * sizeof *v);
-    if (x->rows == 0 || selftest_slides (x, e) || selftest_satisfy (x, e)) selftest_power_of (x, e);
+    if (x->rows == 0 || slides || selftest_satisfy (x, e)) selftest_power_of (x, e);
     memcpy (x->v, v, (size_t)x->s->coords * sizeof *v);
   }
 }
@@ -537,11 +527,10 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   return status;
 }
 
-/* ---- In a scene that uses the type, with its elements, signals, parameters and configuration ----
- *
- * The scene moves randomly around the configuration, in its units.  The type's derivatives along that motion are
- * compared with differences over steps from 2^-8 to 2^-20; for each entry the least error counts.  A correct formula
- * agrees with one of them whatever its scale; a wrong one differs from all by about its magnitude. */
+/* In a scene that uses the type, with its elements, signals, parameters and configuration: the scene moves randomly
+ * around the configuration, in its units.  The type's derivatives along that motion are compared with differences over
+ * steps from 2^-8 to 2^-20; for each entry the least error counts.  A correct formula agrees with one of them whatever
+ * its scale; a wrong one differs from all by about its magnitude. */
 
 #define SCENE_BOUND 1e-5
 static const char scene_reason[] = "1e-5 of the sum of all terms: the best of several differences";
@@ -585,30 +574,12 @@ static void scene_compare (probe *x, const char *check, int rows, probe_function
   for (int i = 0; i < x->elements * x->width; i++) x->value[i] = x->terms[i] = x->size[i] = 0;
 }
 
-static void scene_acceleration (probe *x) {
-  int n = x->elements * x->rows;
-  double tau = x->tau, *gamma = x->derivative; /* not used before the comparison */
-  probe_gamma (x, gamma);
-  probe_J (x, x->block);
-  probe_multiply (x, x->block, x->rows, x->a, tau, x->value, x->terms);
-  for (int i = 0; i < n; i++) x->value[i] -= tau * gamma[i], x->terms[i] += fabs (tau * gamma[i]);
-  scene_compare (x, "gamma", x->rows, probe_drift, PROBE_MOTION);
-}
-
 static void scene_block (probe *x, pw_block block, probe_function *f) {
   int rows = pw_block_rows (x->kind, block);
   probe_move move = block == PW_GAMMA_V || block == PW_FORCE_V ? PROBE_V : PROBE_Q;
   if (pw_evaluate_block (x->workspace, x->batch, block, x->block))
     probe_multiply (x, x->block, rows, move == PROBE_V ? x->dv : x->dq, 1, x->value, x->terms);
   scene_compare (x, selftest_block_name[block], rows, f, move);
-}
-
-static void scene_holonomic (probe *x) {
-  probe_g_size (x, x->size);
-  scene_block (x, PW_G_Q, probe_g);
-  probe_eta (x, x->value);
-  for (int i = 0; i < x->elements * x->rows; i++) x->value[i] *= -x->tau;
-  scene_compare (x, "eta", x->rows, probe_g, PROBE_TIME);
 }
 
 static void scene_signals (probe *x, double *out) {
@@ -632,9 +603,23 @@ static void scene_gradients (probe *x, probe_move move) {
 
 static void scene_all (probe *x) {
   const pw_kind *kind = x->kind;
+  const int n = x->elements * x->rows;
+  double *gamma = x->derivative; /* not used before the comparison */
   probe_update (x, PROBE_Q, 0);
-  if (kind->level == PW_HOLONOMIC) scene_holonomic (x);
-  if (kind->rows > 0) scene_acceleration (x);
+  if (kind->level == PW_HOLONOMIC) {
+    probe_g_size (x, x->size);
+    scene_block (x, PW_G_Q, probe_g);
+    probe_eta (x, x->value);
+    for (int i = 0; i < n; i++) x->value[i] *= -x->tau;
+    scene_compare (x, "eta", x->rows, probe_g, PROBE_TIME);
+  }
+  if (kind->rows > 0) {
+    probe_gamma (x, gamma);
+    probe_J (x, x->block);
+    probe_multiply (x, x->block, x->rows, x->a, x->tau, x->value, x->terms);
+    for (int i = 0; i < n; i++) x->value[i] -= x->tau * gamma[i], x->terms[i] += fabs (x->tau * gamma[i]);
+    scene_compare (x, "gamma", x->rows, probe_drift, PROBE_MOTION);
+  }
   if (x->s->state_dependent) {
     scene_gradients (x, PROBE_Q);
     scene_gradients (x, PROBE_V);
@@ -699,8 +684,6 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   pw_workspace_free (w);
   return status;
 }
-
-/* ---- Blocks of a scene that are computed by differences; non-zero ones that are NULL in the table ---- */
 
 static char *differences_name (const pw_kind *kind, int block, char *buffer, size_t size) {
   return pw_print (buffer, size, "%s of element type %s", selftest_block_name[block], kind->name);

@@ -66,28 +66,6 @@ static void verify_rows (verified_scene *scene, const pw_element_batch *k, const
   for (int i = 0; i < n; i++) scene->position.size[k->row + i] = fmax (y[i], scene->workspace->scale.length);
 }
 
-static void verify_forces (verified_scene *scene, const pw_element_batch *k) {
-  const double *y = verify_evaluate (k, k->kind->force, k->block, k->b.count * k->b.cols);
-  for (int i = 0; i < k->b.count * k->b.cols; i++) {
-    int j = pw_global (k, i / k->b.cols, i % k->b.cols);
-    if (j < scene->s->coords) verify_add (&scene->force, j, -y[i]);
-  }
-}
-
-/* ---- Worst residuals ---- */
-
-/* Replaces the sum in the size of every equation by the largest of these sums, but at least the largest mass times
- * L / T^2; of moments: L times as much. */
-static void verify_force_sizes (verified_scene *scene) {
-  const pw_system *s = scene->s;
-  double L = scene->workspace->scale.length, T = scene->workspace->scale.time, largest = 0;
-  for (int j = 0; j < s->coords; j++) {
-    double unit = pw_is_angle (s, j) ? L : 1;
-    largest = fmax (largest, fmax (scene->force.size[j] / unit, s->M[j] / (unit * unit) * L / (T * T)));
-  }
-  for (int j = 0; j < s->coords; j++) scene->force.size[j] = pw_is_angle (s, j) ? largest * L : largest;
-}
-
 typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size);
 
 /* The worst of n residuals; `unit` is added to each size.  name: names equation `first` + i. */
@@ -109,14 +87,25 @@ static void verify_worst (const pw_system *s, int n, const verify_terms *terms, 
 static void verify_all (verified_scene *scene, const double *v, const double *a, const double *lambda,
                         pw_verification *result) {
   const pw_system *s = scene->s;
-  double L = scene->workspace->scale.length, T = scene->workspace->scale.time;
+  double L = scene->workspace->scale.length, T = scene->workspace->scale.time, largest = 0;
   for (int j = 0; j < s->coords; j++) verify_add (&scene->force, j, (pw_is_hidden (s, j) ? 1 : s->M[j]) * a[j]);
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &scene->workspace->batch[i];
     if (k->kind->rows > 0) verify_rows (scene, k, v, a, lambda);
-    if (k->kind->force) verify_forces (scene, k);
+    const int n = k->kind->force ? k->b.count * k->b.cols : 0;
+    const double *y = n > 0 ? verify_evaluate (k, k->kind->force, k->block, n) : NULL;
+    for (int x = 0; x < n; x++) {
+      int j = pw_global (k, x / k->b.cols, x % k->b.cols);
+      if (j < s->coords) verify_add (&scene->force, j, -y[x]);
+    }
   }
-  verify_force_sizes (scene);
+  /* The size of every force equation is the largest of their sums, but at least the largest mass times L / T^2; of
+   * moments: L times as much. */
+  for (int j = 0; j < s->coords; j++) {
+    double unit = pw_is_angle (s, j) ? L : 1;
+    largest = fmax (largest, fmax (scene->force.size[j] / unit, s->M[j] / (unit * unit) * L / (T * T)));
+  }
+  for (int j = 0; j < s->coords; j++) scene->force.size[j] = pw_is_angle (s, j) ? largest * L : largest;
   verify_worst (s, s->holonomic, &scene->position, 0, pw_system_reaction_name, 0, &result->position);
   verify_worst (s, s->rows, &scene->velocity, L / T, pw_system_reaction_name, 0, &result->velocity);
   verify_worst (s, s->rows, &scene->acceleration, L / (T * T), pw_system_reaction_name, 0, &result->acceleration);

@@ -17,8 +17,7 @@ enum {
   SPECIALISE_INLINE = 8      /* up to this number of rows all functions are inlined: common parts are computed once */
 };
 
-/* ---- Terms: values that generated code has when it runs, and the statements that compute them ---- */
-
+/* Terms are values that generated code has when it runs. */
 typedef enum { TERM_ZERO, TERM_ONE, TERM_CONSTANT, TERM_VARIABLE } term_type;
 
 /* sign times 0 (any sign), 1, a constant of a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
@@ -106,11 +105,10 @@ static term emit_quotient (emitter *to, term a, term b) {
                       b.name);
 }
 
-/* ---- Symbolic elimination of the saddle-point system K = [ M J^T ; J 0 ] of a scene ----
- *
- * K = L D L^T with symmetric 1 x 1 and 2 x 2 pivots, in an order fixed when the code is generated: massless coordinates
- * with the constraint equations that determine them, coordinates with mass, constraint equations by least fill-in
- * (Duff, Erisman & Reid 2017, chapters 5 and 7). */
+/* Symbolic elimination of the saddle-point system K = [ M J^T ; J 0 ] of a scene: K = L D L^T with symmetric 1 x 1 and
+ * 2 x 2 pivots, in an order fixed when the code is generated: massless coordinates with the constraint equations that
+ * determine them, coordinates with mass, constraint equations by least fill-in (Duff, Erisman & Reid 2017, chapters 5
+ * and 7). */
 
 typedef struct {
   int coordinates, n;   /* unknowns: the coordinates, then the constraint equations */
@@ -160,7 +158,7 @@ static void elimination_place (elimination *ldl, int p, int partner) {
 /* The general engine takes over if the pivot of an equation is not larger than this part of its diagonal entry, or if
  * the square of a variable pivot in a massless coordinate's column is not above this part of its sum of squares. */
 #define ELIMINATION_ROW "PW_SCENE_PIVOT"
-#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_is_large demands 2/5 of the largest entry */
+#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_next_pair demands 2/5 of the largest entry */
 
 static void elimination_guard_row (emitter *to, term pivot, term diagonal) {
   char a[24], b[24];
@@ -187,11 +185,6 @@ static void elimination_guard_column (const elimination *ldl, emitter *to, int c
   fprintf (to->code, "));\n");
 }
 
-static void elimination_update (elimination *ldl, emitter *to, int i, int j, term a, term b) {
-  AT (i, j) = emit_difference (to, AT (i, j), a, b);
-  AT (j, i) = AT (i, j);
-}
-
 /* Eliminates unknown p with a 1 x 1 pivot, whose reciprocal is `inverse`. */
 static void elimination_pivot (elimination *ldl, emitter *to, int p, term inverse) {
   fprintf (to->code, "  /* unknown %d */\n", p);
@@ -201,7 +194,8 @@ static void elimination_pivot (elimination *ldl, emitter *to, int p, term invers
     if (elimination_couples (ldl, i, p)) FACTOR (i, p) = emit_product (to, AT (i, p), ldl->inverse[p]);
   for (int i = 0; i < ldl->n; i++)
     for (int j = 0; j <= i && elimination_couples (ldl, i, p); j++)
-      if (elimination_couples (ldl, j, p)) elimination_update (ldl, to, i, j, FACTOR (i, p), AT (j, p));
+      if (elimination_couples (ldl, j, p))
+        AT (i, j) = AT (j, i) = emit_difference (to, AT (i, j), FACTOR (i, p), AT (j, p));
 }
 
 /* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ].  FACTOR (k, c) = K_kc / d is the
@@ -214,29 +208,27 @@ static void elimination_pair (elimination *ldl, emitter *to, int c, int r) {
     if (!elimination_couples (ldl, k, c)) continue;
     FACTOR (k, c) = emit_product (to, AT (k, c), ldl->inverse[c]);
     for (int l = 0; l < ldl->n; l++)
-      if (elimination_couples (ldl, l, r)) elimination_update (ldl, to, k, l, FACTOR (k, c), AT (l, r));
+      if (elimination_couples (ldl, l, r))
+        AT (k, l) = AT (l, k) = emit_difference (to, AT (k, l), FACTOR (k, c), AT (l, r));
   }
-}
-
-/* 1 if the entry of equation i in column j can be a pivot: no other one is much larger at the initial state. */
-static int elimination_is_large (const elimination *ldl, int i, int j) {
-  double most = 0;
-  for (int k = ldl->coordinates; k < ldl->n; k++)
-    if (elimination_couples (ldl, k, j)) most = fmax (most, fabs (AT (k, j).value));
-  return fabs (AT (i, j).value) > 0.4 * most;
 }
 
 /* Finds the next pair of a massless coordinate c and an equation r: a pivot of 1, else a constant, else a variable one;
  * among these the one with the least fill-in, which is far below 1e6.  0 if there is none. */
 static int elimination_next_pair (const elimination *ldl, const double *mass, int *c, int *r) {
   long least = -1;
-  for (int j = 0; j < ldl->coordinates; j++)
-    for (int i = ldl->coordinates; mass[j] == 0 && ldl->step[j] == ldl->n && i < ldl->n; i++) {
-      if (!elimination_couples (ldl, i, j) || !elimination_is_large (ldl, i, j)) continue;
+  for (int j = 0; j < ldl->coordinates; j++) {
+    double most = 0;
+    if (mass[j] > 0 || ldl->step[j] != ldl->n) continue;
+    for (int i = ldl->coordinates; i < ldl->n; i++)
+      if (elimination_couples (ldl, i, j)) most = fmax (most, fabs (AT (i, j).value));
+    for (int i = ldl->coordinates; i < ldl->n; i++) { /* no other entry may be much larger at the initial state */
+      if (!elimination_couples (ldl, i, j) || !(fabs (AT (i, j).value) > 0.4 * most)) continue;
       long rank = AT (i, j).type == TERM_ONE ? 0 : AT (i, j).type == TERM_CONSTANT ? 1 : 2;
       long cost = rank * 1000000 + (long)(elimination_degree (ldl, j) - 1) * (elimination_degree (ldl, i) - 1);
       if (least < 0 || cost < least) least = cost, *c = j, *r = i;
     }
+  }
   return least >= 0;
 }
 
@@ -298,10 +290,7 @@ static int elimination_keep_all (elimination *ldl, emitter *to) {
     int p = ldl->order[m], r = ldl->partner[m];
     elimination_keep (ldl, to, slot, &ldl->inverse[p]);
     EACH_LATER (i, m) {
-      if (p < ldl->coordinates && r < 0)
-        elimination_keep (ldl, to, slot, &AT (i, p));
-      else
-        elimination_keep (ldl, to, slot, &FACTOR (i, p));
+      elimination_keep (ldl, to, slot, p < ldl->coordinates && r < 0 ? &AT (i, p) : &FACTOR (i, p));
       if (r >= 0) elimination_keep (ldl, to, slot, &AT (i, r));
     }
   }
@@ -376,11 +365,10 @@ static void elimination_backward (const elimination *ldl, emitter *to, term *y, 
     y[p] = emit_difference (to, y[p], term_negative (sum), ldl->inverse[p]);
 }
 
-/* ---- Sparsity of element types, found at random states of random scenes ----
- *
- * All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do
- * those of a type that rejects random definitions, and those of a force that is 0 at all these states.  Elements on the
- * ground, with more constant entries, are ignored. */
+/* Sparsity of element types, found at random states of random scenes.  All entries of a plug-in's type count as
+ * variable: the force of a wall, for example, is 0 at most states.  So do those of a type that rejects random
+ * definitions, and those of a force that is 0 at all these states.  Elements on the ground, with more constant entries,
+ * are ignored. */
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 
@@ -456,8 +444,6 @@ static int sparsity_find (const pw_kind *kind, sparsity *out) {
   return status;
 }
 
-/* ---- The generator ---- */
-
 typedef struct {
   const pw_system *s;
   const unsigned char *independent; /* as in pw_system_source */
@@ -494,8 +480,6 @@ static void specialise_list (FILE *out, const char *name, int n) {
   fputc ('\n', out);
 }
 
-/* ---- Texts of source files ---- */
-
 typedef struct {
   const char *name;        /* "pin.c" */
   const char *const *line; /* each with its line end; ends with NULL */
@@ -517,8 +501,6 @@ static void specialise_text (FILE *out, const char *name, unsigned char done[SPE
   for (const char *const *line = source_texts[i].line; *line; line++)
     if (strncmp (*line, "#include \"", 10) != 0) fputs (*line, out);
 }
-
-/* ---- Elements: J, g, sizes of g, right-hand sides, forces, ledger ---- */
 
 /* Opens a block with a batch `b` of element e alone; `more` ends the initialiser of b. */
 static void specialise_batch (const generator *gen, int k, int e, const char *more) {
@@ -631,8 +613,6 @@ static void specialise_ledger (const generator *gen) {
   WRITE ("}\n");
 }
 
-/* ---- Signals, data of a run ---- */
-
 /* 1 if all signals are constants or harmonics of time, which generated code evaluates itself. */
 static int specialise_is_simple (const pw_system *s) {
   for (int i = 0; i < s->sources; i++)
@@ -686,8 +666,6 @@ static void specialise_data (const generator *gen) {
   specialise_list (gen->out, "BATCH", s->batches + 1); /* the last one: the signals */
   specialise_list (gen->out, "WATCH", (int)(sizeof (pw_scene_watch) / sizeof (double)));
 }
-
-/* ---- Products with J, factorisations, solutions ---- */
 
 static term specialise_entry (const generator *gen, int k, int e, int r, int c) {
   const int cols = gen->s->batch[k].b.cols, type = gen->sparsity[k].J[r * cols + c];
@@ -814,8 +792,6 @@ static int specialise_algebra (generator *gen) {
   if (pw_stream_close (gen->emitter.prepare, &gen->prepare) != PW_OK) status = PW_RESOURCE;
   return status;
 }
-
-/* ---- The file ---- */
 
 static void specialise_constants (const generator *gen) {
   const pw_system *s = gen->s;
