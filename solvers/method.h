@@ -11,10 +11,7 @@
 #define PW_METHOD_H_
 #include "saddle.h"
 #include <float.h>
-#include <math.h>
 #include "pinwheel-method.h"
-#include "system.h"
-#include "util.h"
 
 struct pw_run;
 
@@ -80,8 +77,7 @@ int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
  * Returns PW_METHOD. */
 int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 
-/* ---- Conditions on states in signals (sides.c) ---- */
-
+/* Conditions on states in signals (sides.c). */
 typedef struct {
   int count;                                         /* conditions; arrays of this length, unless said otherwise */
   int fixed;                                         /* 1: their sides are */
@@ -101,8 +97,6 @@ typedef struct {
 void pw_run_fix_sides (struct pw_run *r);
 void pw_run_free_sides (struct pw_run *r);
 void pw_run_serialise_sides (struct pw_run *r, pw_archive *a);
-
-/* ---- The data of a run ---- */
 
 enum { PW_MAX_OPTIONS = 12 };
 enum { PW_FORCES_AT_LIMITS = 2 }; /* pw_run.forces: of equations that are not enforced, too */
@@ -154,7 +148,7 @@ struct pw_run {
   long event_count;
   size_t event_room;
   pw_sides *sides;                  /* of conditions in signals; NULL: there are none */
-  struct pw_resolution *resolution; /* of signals that change within less than a step (resolution.h); NULL: none */
+  struct pw_resolution *resolution; /* of signals that change within less than a step (resolution.c); NULL: none */
   int predicted;                    /* 0: the state has changed since it was used to look ahead */
   double resolved_until;            /* time until which fixed steps resolve them */
   int jumped;                       /* 1: multipliers may have jumped at a discontinuity since the last step */
@@ -226,9 +220,8 @@ struct pw_run {
   pw_arena arena;       /* of redundant rows and specialised code */
 };
 
-/* ---- Equations that are not enforced (events.h): they have given multipliers ---- */
-
-/* Sets the multipliers that are multiples of others. */
+/* Equations that are not enforced (events.h) have given multipliers.  Sets the multipliers that are multiples of
+ * others. */
 static inline void pw_couple (pw_run *r, const double *lambda) {
   for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++)
     r->reaction[c->row] = -c->ratio * lambda[c->on];
@@ -248,8 +241,6 @@ static inline void pw_fill_given (struct pw_run *r, double *lambda) {
   for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++)
     lambda[c->row] = c->ratio * lambda[c->on];
 }
-
-/* ---- Tolerances ---- */
 
 /* The unit of a velocity at a value: that of the scene; of a first-order state the value, but at least 1. */
 static inline double pw_velocity_unit (const pw_run *r, int j, double value) {
@@ -275,8 +266,7 @@ static inline double pw_tolerance (const pw_run *r, int state, double value) {
   return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->tolerance_bound[state]);
 }
 
-/* ---- Fixed steps, which end at multiples of the step size after a time `base` ---- */
-
+/* Fixed steps end at multiples of the step size after a time `base`. */
 typedef struct {
   double base;
   long count; /* steps since then */
@@ -346,8 +336,6 @@ double pw_first_step (const pw_run *r);
 static inline double pw_least_step (const pw_run *r) {
   return 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
 }
-
-/* ---- Parts of opening and advancing a run (run.c, run_open.c) ---- */
 
 /* Adds the name of r->w->failed, the last signal that failed, if any, to the error.  Returns status. */
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
@@ -441,8 +429,6 @@ double pw_run_acceleration_norm (const pw_run *r);
  * each other, if the motion has jumped to another branch, or does not resolve a change point; PW_RESOURCE. */
 int pw_run_watchdog (pw_run *r, pw_error *error);
 
-/* ---- Limits (run.c) ---- */
-
 /* 1 if the caller requests a stop, or has done so since r->stopped, which this sets, was last cleared. */
 static inline int pw_run_stop_requested (pw_run *r) {
   if (r->settings.stop && r->settings.stop (r->settings.stop_context)) r->stopped = 1;
@@ -468,8 +454,6 @@ enum { PW_CHECK_INTERVAL = 16 };
 
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
 int pw_run_check_resolution (pw_run *r, pw_error *error);
-
-/* ---- Energy (run.c) ---- */
 
 /* Kinetic and potential energy [J] at the velocities v; kinematics must be up to date. */
 static inline double pw_energy (const pw_run *r, const double *v) {
@@ -503,8 +487,6 @@ double pw_ledger_tolerance (const pw_run *r, double h);
  * rtol times the largest integrand so far, times T, plus round-off. */
 double pw_ledger_norm (const pw_run *r, double h, const double *change);
 
-/* ---- Dynamics ---- */
-
 /* t, or just before the breakpoint if t is not before it: steps that end at a discontinuity evaluate signals there. */
 static inline double pw_before_breakpoint (const pw_run *r, double t) {
   return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
@@ -535,8 +517,6 @@ void pw_record_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
   r->residuals.position = r->residuals.velocity = NAN;
 }
-
-/* ---- Projection ---- */
 
 /* Scaled residuals: the round-off of the few terms of a row, to which an iteration converges; the largest that is
  * accepted where it stalls, times the largest angle before the iteration. */
@@ -583,8 +563,6 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
  * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */
 void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
-/* ---- Specialised code (dynamics.c) ---- */
-
 /* Opens the settings' specialised code, if any; the scales, alpha and beta must be known.  Errors: PW_INPUT,
  * PW_RESOURCE. */
 int pw_specialised_open (pw_run *r, pw_error *error);
@@ -608,7 +586,12 @@ static inline int pw_specialised_suits (const pw_run *r) {
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
 void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 
-/* ---- Initial conditions ---- */
+/* Opens r->resolution (resolution.c), the longest step in which signals are seen, at the initial state, whose
+ * kinematics must be up to date; it stays NULL where no signal needs it. */
+int pw_resolution_open (pw_run *r, pw_error *error);
+/* The time at which the next adaptive step must end at the latest; INFINITY with fixed steps, which are counted if they
+ * do not resolve a signal.  Sets r->resolved_until, which is INFINITY before. */
+double pw_resolution_end (pw_run *r);
 
 /* As pw_run_open, with the initial state as it is given, for evaluations at other ones. */
 pw_run *pw_run_open_inconsistent (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);

@@ -1,6 +1,5 @@
 /* Records errors: a pw_error keeps the first one, with its text cut to fit and made printable. */
 #include <stdarg.h>
-#include <stdio.h>
 #include "util.h"
 
 int pw_fail (pw_error *error, int status, const char *format, ...) {

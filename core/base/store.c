@@ -1,5 +1,4 @@
 /* Checksums, arrays that grow, tables of names, arenas, and arrays in one allocation. */
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"

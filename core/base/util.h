@@ -3,7 +3,6 @@
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
-#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include "pinwheel.h"
@@ -26,14 +25,11 @@ static inline int pw_require (const void *object, const char *type, pw_error *er
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", type);
 }
 
-/* ---- Members of pw_statistics, as checkpoints and JSON contain them ---- */
-
+/* Members of pw_statistics, as checkpoints and JSON contain them. */
 #define PW_STATISTICS_COUNTS(X) \
   X (steps)                     \
   X (rejected) X (rhs) X (jacobians) X (factorisations) X (restarts) X (specialised) X (conditions) X (unresolved)
 #define PW_STATISTICS_RESIDUALS(X) X (position) X (velocity) X (g) X (jv)
-
-/* ---- Nearest names, domains of numbers (text.c) ---- */
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
 
@@ -61,8 +57,6 @@ const char *pw_domain_text (pw_domain domain);
 /* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);
 
-/* ---- Numbers ---- */
-
 /* The next 64 random bits: SplitMix64 (Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators). */
 static inline uint64_t pw_random_bits (uint64_t *state) {
   uint64_t z = *state += 0x9e3779b97f4a7c15;
@@ -75,8 +69,6 @@ static inline uint64_t pw_random_bits (uint64_t *state) {
 static inline double pw_value_within (double first, double last) {
   return first + 0.382 * (last - first);
 }
-
-/* ---- Zero-terminated texts (text.c) ---- */
 
 /* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
@@ -100,8 +92,6 @@ char *pw_join (char *buffer, size_t size, const char *first, ...);
 /* The result of pw_system_state_name, or a function like it, in such a buffer. */
 #define PW_NAME(function, s, i) function (s, i, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES)
 
-/* ---- Streams into memory (text.c) ---- */
-
 typedef struct {
   char *text;        /* zero-terminated; up to date after fflush */
   size_t size, room; /* bytes of the text; allocated */
@@ -109,8 +99,6 @@ typedef struct {
 FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory; close it even then */
 /* Closes f.  PW_RESOURCE, and t->text is NULL, if f is NULL or any part of the text is missing.  Free t->text. */
 int pw_stream_close (FILE *f, pw_stream *t);
-
-/* ---- Checksums, tables of names, memory (store.c) ---- */
 
 /* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
 #define PW_CHECK 14695981039346656037u

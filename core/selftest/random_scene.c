@@ -1,7 +1,5 @@
 /* Builds the scene of the self-test from the table of an element type. */
-#include <math.h>
 #include <string.h>
-#include "model.h"
 #include "selftest.h"
 
 double pw_random_between (pw_random *r, double low, double high) {

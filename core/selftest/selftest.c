@@ -1,8 +1,6 @@
 /* The self-tests of element types: in a random scene, and in a scene that uses the type.  Most checks compare one
  * function of its table with differences of another. */
 #include <float.h>
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "selftest.h"

@@ -1,7 +1,6 @@
 /* Random numbers, and random scenes of elements of one type, for the self-test and specialise.c. */
 #ifndef PW_SELFTEST_H_
 #define PW_SELFTEST_H_
-#include <stdint.h>
 #include "system.h"
 #include "pinwheel-selftest.h"
 

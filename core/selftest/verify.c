@@ -5,7 +5,6 @@
  * L / T^2, with the length L and time T of the run, so that round-off is about 1e-16 in any units.  A position residual
  * is divided by the size that its element type states, at least L.  Residuals of forces are divided by the largest
  * force in the scene, since those on a massless body may all be round-off. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"

@@ -1,12 +1,8 @@
 /* Writes C code for one compiled system: the source texts of its element types, called for one element at a time with
  * constant indices, and a factorisation without loops.  scene_head.inc explains the macros in the code. */
 #define _POSIX_C_SOURCE 200809L
-#include <math.h>
-#include <stddef.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "system.h"
 #include "specialised.h"
 #include "selftest.h"
 

@@ -2,7 +2,6 @@
  *
  * All arrays of the system but that of the batches are in its arena. */
 #include <limits.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"
@@ -329,7 +328,6 @@ static int compile_signal (const compilation *job, pw_source *source, const pw_s
   return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
 }
 
-/* The signals of limits, and their elements and fields. */
 static int compile_limit_signals (const compilation *job) {
   pw_system *s = job->s;
   const compiled *from = job->list;
@@ -482,7 +480,6 @@ static void compile_partners (pw_system *s, const pw_element_batch *k) {
   }
 }
 
-/* The limits of all multipliers, if there are any. */
 static int compile_limits (const compilation *job) {
   pw_system *s = job->s;
   const compiled *from = job->list;

@@ -1,8 +1,5 @@
 /* The workspace of a run: kinematics, evaluation of all batches, products with J, second-order blocks, ledger. */
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include "system.h"
 #include "sine.h"
 

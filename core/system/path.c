@@ -8,7 +8,6 @@
  * signs of the coefficients of f in the basis of Bernstein polynomials of degree 5 change at least as often as f does:
  * halving isolates the roots (Farin 2002, Curves and Surfaces for CAGD, chapter 5).  Most pieces are left out, since
  * the distance changes at most as fast as the arc length. */
-#include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -141,7 +140,6 @@ static double make_turn (const piece *from, int end, const piece *to, int to_end
   return atan2 (f[0][1] * t[1][1] - f[1][1] * t[0][1], f[0][1] * t[0][1] + f[1][1] * t[1][1]);
 }
 
-/* Arc lengths and directions of the pieces. */
 static int make_index (pw_path *p, pw_error *error) {
   piece *last = p->piece + p->pieces - 1;
   double s = 0, heading = atan2 (p->piece->x[1][1], p->piece->x[0][1]);

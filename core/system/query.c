@@ -1,7 +1,5 @@
 /* Names and sizes of a compiled system; times at which its signals jump. */
 #include <float.h>
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include "system.h"
 

@@ -1,6 +1,4 @@
 /* Signals: values, first two time derivatives and breakpoints of each form; their fields and checks. */
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include "system.h"
 

@@ -197,8 +197,6 @@ static inline unsigned char pw_can_hold (const pw_bounds *x) {
   return x->least < 0 || x->most > 0;
 }
 
-/* ---- Columns and outputs ---- */
-
 /* The offset in pw_sample of a column that is one of its numbers. */
 size_t pw_column_offset (pw_column_type type);
 
@@ -209,8 +207,6 @@ void pw_evaluate_contacts (const pw_workspace *w, double (*out)[3]); /* at the k
 /* Opens the contexts of functions; a status.  Closes them. */
 int pw_open_outputs (pw_compiled_output *output, int count);
 void pw_close_outputs (const pw_compiled_output *output, int count);
-
-/* ---- Signals ---- */
 
 /* Stores value, first and second derivative at time t, or another argument, in source->u; of a force's signal the
  * derivatives are meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function
@@ -243,9 +239,8 @@ static inline double pw_table_value (const pw_signal *s, int i) {
  * one meaningless), then the second derivatives.  Ignores scale and offset, which compilation has applied. */
 void pw_table_spline (const pw_signal *s, double *spline);
 
-/* ---- Kinematics: configurations and signals at (t, q, v), which all evaluations below use ---- */
-
-/* The workspace refers to the internal coordinates in q and v from now on.  Returns PW_METHOD if a signal fails. */
+/* Kinematics: configurations and signals at (t, q, v), which all evaluations below use.  The workspace refers to the
+ * internal coordinates in q and v from now on.  Returns PW_METHOD if a signal fails. */
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v);
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
@@ -260,8 +255,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
  * before pw_update_velocities then. */
 void pw_hold_signals (pw_workspace *w, pw_hold hold);
 
-/* ---- Evaluations; arrays over constraint equations have `rows` entries, f has `coords` + 3 ---- */
-
+/* Evaluations; arrays over constraint equations have `rows` entries, f has `coords` + 3. */
 void pw_evaluate_J (pw_workspace *w);                    /* fills J of every batch */
 void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
 void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic, in units of g; at least L, for angles L rad */

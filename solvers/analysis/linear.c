@@ -21,14 +21,10 @@
  * Garcia de Jalon & Bayo 1994, Kinematic and Dynamic Simulation of Multibody Systems.  Relative equilibria: Marsden &
  * Ratiu 1999, Introduction to Mechanics and Symmetry.) */
 #include <complex.h>
-#include <float.h>
 #include <lapacke.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "events.h"
 #include "linear.h"
-#include "util.h"
 #include "rank.h"
 
 /* Adds the derivatives with respect to q and v, by rows: (J^T lambda)_q - f_q and -f_v; gamma_q - (J a)_q and gamma_v;
@@ -67,7 +63,6 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
   return PW_OK;
 }
 
-/* Computes `product` from the variation dx. */
 static void linear_multiply (pw_linearisation *x) {
   const pw_scatter_map *t = &x->tangent.scatter;
   memset (x->product, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->product);

@@ -4,7 +4,6 @@
 #ifndef PW_LINEAR_H
 #define PW_LINEAR_H
 
-#include "method.h"
 #include "pinwheel-analysis.h"
 #include "tangent.h"
 

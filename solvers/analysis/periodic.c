@@ -15,11 +15,8 @@
  * the frame that has moved with the whole.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic
  * orbits.) */
 #include <lapacke.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "search.h"
-#include "util.h"
 
 enum {
   PERIODIC_WORK = 34,             /* numbers of work space of LAPACK per minimal coordinate */

@@ -6,7 +6,6 @@
 #ifndef PW_SEARCH_H
 #define PW_SEARCH_H
 
-#include <math.h>
 #include "continuation.h"
 #include "linear.h"
 
@@ -69,8 +68,6 @@ struct pw_steady {
   pw_arena arena;        /* of the other arrays */
 };
 
-/* ---- steady_symmetries.c ---- */
-
 /* The rates of a displacement [L/s, rad/s]: of the whole along x and y, its rotation about the origin; then of the
  * angle of each body alone; then of each internal coordinate [its unit/s]. */
 enum { PW_RATE_X, PW_RATE_Y, PW_RATE_TURN, PW_RATE_ANGLES };
@@ -118,8 +115,6 @@ enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
  * change by the variation (dq, dv); divided by the unit of A. */
 double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
 
-/* ---- steady.c ---- */
-
 /* *changed: the first signal that (or a derivative of which) changes within the span after time t, or if period > 0,
  * differs between times in this span and one period later; -1: none.  Signals are compared in the run's state and in
  * one up to a unit of the scene away.  A status. */
@@ -140,8 +135,6 @@ static inline int pw_check_branch (int direction, double first, double last, pw_
 
 /* As pw_steady_open, for searches that need only scales and symmetries: signals may change. */
 pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
-
-/* ---- Periodic motions (periodic.c and its tests) ---- */
 
 /* What pw_periodic_flow computes: the motion; or its derivatives only, accurate enough for Newton's method, or for
  * multipliers. */

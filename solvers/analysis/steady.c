@@ -15,13 +15,8 @@
  *
  * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
 #include <lapacke.h>
-#include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include "search.h"
-#include "util.h"
 #include "rank.h"
 
 enum {
@@ -657,7 +652,6 @@ static int steady_rest (pw_steady *x) {
   return 0;
 }
 
-/* Newton's method from the state of an attempt. */
 static int steady_converge (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
   const double range = x->settings.last - x->settings.first;
   x->free_symmetries = 0;

@@ -2,13 +2,9 @@
  * these are changes of angles on which nothing depends, such as that of a wheel that rolls.  They span the null space
  * of the derivatives of the equations along all displacements, at states in general position, near the initial one and
  * far away, since forces may be constant over a region only; and at each solution (pw_steady_keep_symmetries). */
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include "rank.h"
 #include "search.h"
-#include "util.h"
 
 enum {
   SYMMETRY_NEAR = 2,  /* states; more than one, since a body alone has more displacements than equations */

@@ -31,10 +31,7 @@
  * are of about the same size, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
  * Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of index three
  * differential algebraic equations). */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "implicit.h"
 
 struct pw_method_data {

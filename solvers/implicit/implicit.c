@@ -1,7 +1,5 @@
 /* Parts of galpha and leapfrog: opening, scaling of the Newton matrix, steps; see implicit.h. */
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "implicit.h"
 
 static pw_implicit *implicit_of (pw_run *r) {

@@ -6,7 +6,6 @@
 #include "tangent.h"
 #include "dense_output.h"
 #include "sparse.h"
-#include "util.h"
 
 /* What a test of convergence decides; radau uses it, too. */
 typedef enum { PW_ITERATE, PW_CONVERGED, PW_DIVERGED } pw_convergence;

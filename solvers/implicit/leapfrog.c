@@ -16,10 +16,7 @@
  *
  * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and velocity-dependent forces by
  * fixed-point iteration.  M^-1 is not needed: massless coordinates follow from their constraint equations. */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "implicit.h"
 
 enum { DRIFT_MOST = 30, KICK_MOST = 100 }; /* Newton iterations for u; fixed-point iterations for v' */

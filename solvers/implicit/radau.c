@@ -24,13 +24,8 @@
  *
  * Accelerations and multipliers at the ends of steps and in samples are computed from positions and velocities, which
  * are more accurate than the multipliers of the stages.  Work and losses are integrated with the stages. */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "implicit.h"
-#include "dense_output.h"
-#include "util.h"
 
 /* Coefficients, in the notation above, computed with 60 digits from the nodes c. */
 enum { STAGES = 3 };

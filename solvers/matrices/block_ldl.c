@@ -8,11 +8,9 @@
 #include <amd.h>
 #include <limits.h>
 #include <math.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include "block_ldl.h"
-#include "util.h"
 
 /* This file reads pairs of numbers shortly after storing them one by one: a vector load would stall until both stores
  * are complete. */

@@ -26,13 +26,11 @@
 #include <btf.h>
 #include <float.h>
 #include <limits.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "saddle.h"
 #include "block_ldl.h"
 #include "dense.h"
-#include "util.h"
 
 /* A pivot is 1 minus a squared cosine.  Round-off leaves the pivot of a dependent row at about eps / s^2, with s the
  * smallest sine of the rows before it: at this one if s = 0.07.  With a smaller s such a row passes, but its sine is
@@ -45,7 +43,6 @@ enum { MASSLESS_GROUPS = PW_MAX_BODIES + PW_MAX_INTERNAL }; /* most groups of on
 static inline int group_of (const pw_system *s, int j) {
   return j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
 }
-/* The first coordinate of a group. */
 static inline int group_first (const pw_system *s, int group) {
   return group < s->bodies ? 3 * group : group + 2 * s->bodies;
 }
@@ -149,7 +146,6 @@ typedef struct {
 
 static const double massless_zeros[3] = { 0 };
 
-/* Copies J of row i to A. */
 static inline void massless_copy (pw_component *c, int i) {
   const double **from = c->row[i].source;
   for (const massless_group *g = c->group; g < c->group + c->groups; g++) {

@@ -1,8 +1,6 @@
 /* Derivatives of the equations of motion in a sparse matrix; see tangent.h. */
 #include <stdlib.h>
-#include <string.h>
 #include "tangent.h"
-#include "util.h"
 
 int pw_tangent_open (pw_tangent *x, pw_run *r) {
   const pw_system *s = r->s;
@@ -181,7 +179,6 @@ static void given_add_row (pw_tangent *x, pw_element_batch *k, int i, int row, i
   }
 }
 
-/* Adds `coefficient` times the gradient of a signal to a row. */
 static void feedback_add_gradient (pw_tangent *x, const pw_source *source, double coefficient, int row,
                                    const pw_feedback *put) {
   const int n = x->run->s->coords;
@@ -192,7 +189,6 @@ static void feedback_add_gradient (pw_tangent *x, const pw_source *source, doubl
   }
 }
 
-/* Adds `coefficient` times the derivatives of the rate of a signal to a row. */
 static void feedback_add_rate (pw_tangent *x, const pw_source *source, double coefficient, int row,
                                const pw_feedback *put) {
   const int n = x->run->s->coords, recording = x->scatter.recording;

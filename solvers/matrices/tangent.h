@@ -2,11 +2,8 @@
  * out in compressed columns; from then on the number of a contribution in the sequence determines where it is added. */
 #ifndef PW_TANGENT_H_
 #define PW_TANGENT_H_
-#include <stdint.h>
 #include <string.h>
-#include "pinwheel.h"
 #include "method.h"
-#include "system.h"
 
 typedef struct {
   int recording;      /* 1: contributions are recorded; 0: they are added */

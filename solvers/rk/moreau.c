@@ -21,13 +21,10 @@
  * equations, h lambda0 + x over h, are means over the step: those of an impact grow with 1/h.
  *
  * Samples inside a step: v linear between its ends, q its integral, both projected. */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "dense_output.h"
 #include "events.h"
-#include "util.h"
 
 static const double MOREAU_ROUND_OFF = 1e4 * DBL_EPSILON; /* of corrections, which small masses magnify */
 enum { MOREAU_MOST = 30 }; /* fixed-point iterations for the velocities in the middle of a step */

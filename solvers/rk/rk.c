@@ -5,14 +5,11 @@
  *
  * The rates of work and losses are integrated with the same stages.  The new state may be projected.  Its accelerations
  * are evaluated immediately, as stage 0 of the next step, so that they are always available. */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "rk.h"
 #include "dense_output.h"
 #include "specialised.h"
-#include "util.h"
 
 enum { NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
 enum { RK_NODES = 3 };         /* states inside a step between which samples are interpolated */
@@ -211,7 +208,6 @@ static int nullspace_finalise (rk_nullspace *b, pw_projector *p, pw_run *r, doub
   return status;
 }
 
-/* 1 if the next step ends with a coordinate projection. */
 static int rk_projects_next (const pw_run *r) {
   const pw_method_data *d = r->data;
   return d->projects && (d->every == 1 || (r->statistics.steps + 1) % d->every == 0);

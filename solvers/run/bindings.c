@@ -1,6 +1,4 @@
 /* For programs in other languages: samples in rows of an array, signals whose value they set, layouts of structures. */
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include "method.h"
 #include "pinwheel-analysis.h"

@@ -5,13 +5,11 @@
  *   J a = gamma - alpha (J v - eta)                  for nonholonomic ones
  *
  * (Baumgarte 1972, Stabilization of constraints and integrals of motion in dynamical systems.) */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
 #include "specialised.h"
-#include "util.h"
 
 /* Specialised code is compiled for one scene and serves in place of the general evaluation and projection.  It refuses
  * states at which a pivot is small or a value extreme; the general functions evaluate these. */

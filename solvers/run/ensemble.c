@@ -1,5 +1,4 @@
 /* Ensembles: runs that a caller steps together, in lanes and threads, with inputs that it sets between steps. */
-#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>

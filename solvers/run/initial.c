@@ -16,16 +16,10 @@
  *
  * with the damping D: the step of Levenberg and Marquardt for g = 0, which dependent equations do not disturb.  (More
  * 1978, The Levenberg-Marquardt algorithm: implementation and theory.) */
-#include <float.h>
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include "method.h"
 #include "rank.h"
 #include "tangent.h"
 #include "sparse.h"
-#include "util.h"
 
 /* Importance of a value. */
 enum {

@@ -1,12 +1,10 @@
 /* The table of integrators; reading the names of methods: integrator[+stabilisation][:option=value]... */
 #include <assert.h>
 #include <locale.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "methods.h"
-#include "util.h"
 
 #define PW_METHOD(m) extern const pw_method pw_method_##m;
 PW_METHODS

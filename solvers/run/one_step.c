@@ -1,11 +1,8 @@
 /* The functions of pinwheel-method.h for one-step methods of users, and dense output; pw_run_option, pw_run_accelerate:
  * dynamics.c. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "dense_output.h"
-#include "pinwheel-method.h"
-#include "util.h"
 
 struct pw_method_data {
   pw_dense_output last;

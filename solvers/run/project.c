@@ -7,7 +7,6 @@
  *
  * (Lubich 1991, Extrapolation integrators for constrained multibody systems; Eich 1993, Convergence results for a
  * coordinate projection method applied to mechanical systems with algebraic constraints.) */
-#include <math.h>
 #include "method.h"
 #include "specialised.h"
 

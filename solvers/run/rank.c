@@ -4,13 +4,10 @@
  * The rank is computed at the initial configuration and at up to three a short motion away.  During the motion the set
  * may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon & Gutierrez-Lopez 2013,
  * Multibody dynamics with redundant constraints and singular mass matrix.) */
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
-#include "util.h"
 
 void pw_list_elements (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size) {
   char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";

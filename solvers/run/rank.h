@@ -2,7 +2,6 @@
 #ifndef PW_RANK_H
 #define PW_RANK_H
 
-#include "run.h"
 #include "system.h"
 
 struct pw_run;

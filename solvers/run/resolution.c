@@ -9,11 +9,8 @@
  *
  * Adaptive steps end within the time that is resolved; it is found by halving.  Fixed steps that are longer are
  * counted. */
-#include <float.h>
-#include <math.h>
 #include <string.h>
-#include "resolution.h"
-#include "util.h"
+#include "method.h"
 
 #define RESOLUTION_SEEN 0.25     /* largest deviation over the difference of the values seen */
 #define RESOLUTION_SHARE 0.1     /* of the tolerance: change of velocities that a step may miss */

@@ -1,12 +1,8 @@
 /* A run: its steps, samples, restarts and end; for its opening see run_open.c. */
-#include <float.h>
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
 #include "method.h"
-#include "util.h"
 
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   char signal[PW_NAME_BYTES];

@@ -1,14 +1,9 @@
 /* Opening a run: settings, consistent initial state, accelerations there, method.  Restarts, checkpoints. */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "events.h"
-#include "resolution.h"
 #include "methods.h"
 #include "rank.h"
-#include "method.h"
-#include "util.h"
 
 #define RUN_LEAST_RTOL (100 * DBL_EPSILON) /* round-off exceeds smaller tolerances */
 #define RUN_MOST_STEPS 1e15                /* of a fixed size: shorter ones vanish in the round-off of the time */

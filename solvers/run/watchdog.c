@@ -3,13 +3,10 @@
  *
  * The sine (method.h) changes by at most a multiple of the motion of the bodies (`lipschitz`), so it is computed
  * again only when the motion since could have made it small. */
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
-#include "util.h"
 
 /* Residuals are scaled; lengths and motions are in units of L and rad; a relative sine is the sine over the largest one
  * of the run.  s: the sine; d: the residual; eps: the machine precision.  Where branches cross, the constraints are

@@ -2,11 +2,8 @@
  *
  * The Newton matrix is exact and sparse, factorised by KLU.  The error test covers positions and velocities, including
  * those of massless coordinates; in si1 it covers all unknowns. */
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <idas/idas.h>
-#include "tangent.h"
 #include "dense_output.h"
 #include "rank.h"
 #include "sundials.h"
@@ -19,7 +16,6 @@ struct pw_method_data {
   double *unit;    /* active rows: 1 for a force, L for a moment */
 };
 
-/* Updates kinematics and J at the unknowns y. */
 static int ida_update (pw_method_data *d, double t, const double *y) {
   return pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
 }
@@ -94,7 +90,6 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
   return 0;
 }
 
-/* Fills IDA's vectors with the state reached. */
 static void ida_fill_vectors (pw_method_data *d) {
   const pw_run *r = d->sun.run;
   size_t n = (size_t)d->dae.n;

@@ -10,14 +10,10 @@
  * steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
  * nonlinear and differential/algebraic equation solvers.) */
 #include <cvodes/cvodes.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 #include "sundials.h"
-#include "tangent.h"
 #include "dense_output.h"
-#include "util.h"
 
 /* Newton's iteration of bdf; see below. */
 typedef struct {
@@ -135,7 +131,6 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
   return SUNLS_SUCCESS;
 }
 
-/* Opens the Newton matrix and attaches it to CVODES. */
 static int newton_open (pw_method_data *d) {
   bdf_newton *w = &d->newton;
   pw_sun *x = &d->sun;

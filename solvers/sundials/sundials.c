@@ -3,14 +3,9 @@
 #include <cvodes/cvodes.h>
 #include <idas/idas.h>
 #include <lapacke.h>
-#include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sundials/sundials_version.h>
 #include "sundials.h"
-#include "util.h"
 
 static_assert (sizeof (sunindextype) == sizeof (int64_t), "SUNDIALS with 64-bit indices is expected");
 static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAIL && CV_RHSFUNC_FAIL == IDA_RES_FAIL &&

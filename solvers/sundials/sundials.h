@@ -1,8 +1,6 @@
 /* What adams, bdf and ida share: they use integrators of SUNDIALS, version 6 (tested with 6.4). */
 #ifndef PW_SUNDIALS_H_
 #define PW_SUNDIALS_H_
-#include "method.h"
-#include <stdint.h>
 #include <sundials/sundials_types.h>
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_linearsolver.h>
