@@ -360,6 +360,8 @@ static int change_resolve (pw_run *r, double last_sine, pw_error *error) {
  * proportional to an estimate of 2 p (t* - t), until |x| has grown by orders of magnitude. */
 
 enum { DEAD_STEPS = 600, DEAD_STARTS = 24 }; /* the most steps of a walk, and states at which it tries to begin */
+enum { DEAD_PARTS = 16 };                    /* most parts of a step in which the sine is evaluated, */
+static const double DEAD_SAMPLES = 0.6;      /* their number over the change of the sine; above 1/2 */
 static const double DEAD_STRIDE = 0.3;       /* the longest step, and the largest correction, in units of the scene */
 /* |x| over the largest prescribed velocity: a typical value, and the growth above it that counts as unbounded. */
 static const double DEAD_RATIO = 100, DEAD_GROWTH = 100;
@@ -530,6 +532,30 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
   return status;
 }
 
+/* 1 if the last step may have passed a dead point, where the sine vanishes.  K: its largest change per unit of motion.
+ * It is positive within a distance of sine / K from the end of the step.  Where it is nowhere low, the step is close to
+ * the motion, here to a straight line, and the sine is positive between two places whose sines exceed K times their
+ * distance in sum.  start: a lower bound of the sine at the beginning.  r->q_at is scratch. */
+static int dead_may_be_passed (pw_run *r, double start) {
+  const pw_watchdog *watch = &r->watchdog;
+  const double change = r->thresholds.lipschitz * watch->largest_sine * watch->step_length, end = watch->checked_sine;
+  const double low = r->thresholds.low * watch->largest_sine;
+  if (r->s->rheonomic == 0 || r->w->failed || end > change) return 0;
+  const int parts = 1 + (int)fmin (DEAD_SAMPLES * change / end, DEAD_PARTS);
+  int may = 0;
+  for (int i = 1; i <= parts && !may; i++) {
+    const double part = (double)i / parts, t = watch->previous_t + part * (r->t - watch->previous_t);
+    const double *q0 = watch->previous_q;
+    for (int j = 0; j < r->s->coords && i < parts; j++) r->q_at[j] = q0[j] + part * (r->q[j] - q0[j]);
+    const double sine = i < parts ? change_sine_at (r, t, r->q_at) : end;
+    may = !(fmin (start, sine) > low && start + sine > change / parts);
+    start = sine;
+  }
+  r->w->failed = NULL;
+  (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
+  return may;
+}
+
 int pw_dead_point_explain (pw_run *r, pw_error *error) {
   double step = r->fixed_steps ? r->settings.step : r->t - r->watchdog.previous_t;
   (void)dead_check (r, r->watchdog.previous_t + fmax (10 * step, 0.5 * r->w->scale.time), error);
@@ -595,12 +621,12 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   double near = r->thresholds.near * watch->largest_sine, ahead = r->thresholds.step_growth * watch->step_length;
   int may_be_near = watchdog_reaches (r, near, ahead);
   if (may_be_near) {
-    double last = watch->moved == watch->step_length ? watch->checked_sine : NAN;
+    const double earlier = watch->moved - watch->step_length, last = earlier > 0 ? NAN : watch->checked_sine;
+    const double start = watch->checked_sine - r->thresholds.lipschitz * watch->largest_sine * earlier;
     watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
     status = pw_change_point_check (r, watch->checked_sine, error);
     if (status == PW_OK) status = change_resolve (r, last, error);
-    if (!(watch->checked_sine > r->thresholds.lipschitz * watch->largest_sine * watch->step_length) && status == PW_OK)
-      status = dead_check (r, r->t, error);
+    if (status == PW_OK && dead_may_be_passed (r, start)) status = dead_check (r, r->t, error);
     if (status != PW_OK) return status;
     watch->sine_before_checked = last;
   } else
