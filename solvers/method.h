@@ -98,6 +98,12 @@ void pw_run_fix_sides (struct pw_run *r);
 void pw_run_free_sides (struct pw_run *r);
 void pw_run_serialise_sides (struct pw_run *r, pw_archive *a);
 
+/* Fixed steps end at multiples of the step size after a time `base`. */
+typedef struct {
+  double base;
+  long count; /* steps since then */
+} pw_step_counter;
+
 enum { PW_MAX_OPTIONS = 12 };
 enum { PW_FORCES_AT_LIMITS = 2 }; /* pw_run.forces: of equations that are not enforced, too */
 
@@ -215,9 +221,10 @@ struct pw_run {
   pw_initial_report initial;
   unsigned long long identity; /* checkpoint_identity (run_open.c) */
   pw_statistics statistics;
-  pw_method_data *data; /* private to the integrator */
-  char *memory;         /* of the state, samples and scratch */
-  pw_arena arena;       /* of redundant rows and specialised code */
+  pw_step_counter counter; /* of fixed steps */
+  pw_method_data *data;    /* private to the integrator */
+  char *memory;            /* of the state, samples and scratch */
+  pw_arena arena;          /* of redundant rows and specialised code */
 };
 
 /* Equations that are not enforced (events.h) have given multipliers.  Sets the multipliers that are multiples of
@@ -266,31 +273,25 @@ static inline double pw_tolerance (const pw_run *r, int state, double value) {
   return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->tolerance_bound[state]);
 }
 
-/* Fixed steps end at multiples of the step size after a time `base`. */
-typedef struct {
-  double base;
-  long count; /* steps since then */
-} pw_step_counter;
-
 /* End of the next step of size h: the next multiple of h; or t_end or a breakpoint, if it is earlier, or later by up to
  * PW_STEP_LONGER h, so that no tiny step remains, in which round-off dominates multipliers; *whole: 1 if it is the
  * multiple.  Times within 1e-9 h of each other differ by round-off only. */
 #define PW_STEP_LONGER 0.01
-static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, double t_end, int *whole) {
-  double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h,
+static inline double pw_step_end (const pw_run *r, double t_end, int *whole) {
+  double h = r->settings.step, t1 = r->counter.base + (double)(r->counter.count + 1) * h,
          stop = t_end < r->breakpoint ? t_end : r->breakpoint;
   int is_before = t1 <= stop - PW_STEP_LONGER * h;
   *whole = is_before || fabs (t1 - stop) < 1e-9 * h;
   return is_before ? t1 : stop;
 }
 /* Counts a step to t1; after one that is not whole, steps are counted from t1. */
-static inline void pw_count_step (pw_step_counter *c, int whole, double t1) {
-  c->count++;
-  if (!whole) *c = (pw_step_counter){ .base = t1 };
+static inline void pw_count_step (pw_run *r, int whole, double t1) {
+  r->counter.count++;
+  if (!whole) r->counter = (pw_step_counter){ .base = t1 };
 }
-static inline void pw_serialise_counter (pw_step_counter *c, pw_archive *a) {
-  pw_archive_bytes (a, &c->base, sizeof c->base);
-  pw_archive_count (a, &c->count);
+static inline void pw_serialise_counter (pw_run *r, pw_archive *a) {
+  pw_archive_bytes (a, &r->counter.base, sizeof r->counter.base);
+  pw_archive_count (a, &r->counter.count);
 }
 
 /* 1 if the run's stabilisation is of this kind. */
@@ -355,12 +356,6 @@ int pw_run_evaluate (pw_run *r, pw_error *error);
 /* After pw_run_evaluate at a regular state: restarts the watchdog there, and makes the independence of the active rows
  * the reference for later states. */
 void pw_run_set_references (pw_run *r);
-
-/* pw_next_breakpoint of the run's system; with kinks for methods of order > 2: lower orders do not suffer from a kink
- * inside a step, and multistep methods (order 0) lose more by a restart. */
-static inline double pw_run_next_breakpoint (const pw_run *r, double t) {
-  return pw_next_breakpoint (r->w, r->method->order > 2, t);
-}
 
 /* Finds the next discontinuity after the state reached, r->breakpoint. */
 int pw_run_look_ahead (pw_run *r, pw_error *error);

@@ -319,11 +319,10 @@ static int compile_reads (const compilation *job, pw_source *source, const char 
 }
 
 static int compile_signal (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
-  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
-  void *context = opens ? opens->open (opens->context) : NULL;
-  if (opens && context == NULL) return compile_no_memory (job);
+  int status = PW_OK;
   source->signal = *signal;
-  if (context) source->signal.function.context = context;
+  if (signal->type == PW_FUNCTION) pw_open_function (&source->signal.function, &status);
+  if (status != PW_OK) return compile_no_memory (job);
   if (signal->type == PW_TABLE) return compile_table (job, source, element);
   return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
 }
@@ -399,13 +398,15 @@ static double compile_length (const compilation *job) {
   return L > 0 ? L : 1;
 }
 
-static int compile_angle_users (const compilation *job) {
+/* Users of angles, and constant forces. */
+static int compile_evaluated (const compilation *job) {
   pw_system *s = job->s;
-  int inertialess = 0, element = 0;
-  for (int b = 0; b < s->bodies; b++) s->angle_user[b] = -1, inertialess += s->M[3 * b + 2] == 0;
-  if (inertialess == 0) return PW_OK;
-  pw_workspace *w = pw_workspace_new (s, job->error);
-  if (w == NULL) return PW_RESOURCE;
+  int needed = 0, element = 0;
+  for (int b = 0; b < s->bodies; b++) s->angle_user[b] = -1, needed |= s->M[3 * b + 2] == 0;
+  for (int i = 0; i < s->batches; i++) needed |= s->batch[i].kind->constant;
+  pw_workspace *w = needed ? pw_workspace_new (s, job->error) : NULL;
+  if (w == NULL) return needed ? PW_RESOURCE : PW_OK;
+  pw_add_constant_forces (w, s->constant);
   PW_EACH_BATCH (k, w)
     for (int e = 0; e < k->b.count; e++, element++) {
       for (int n = 0; n < k->kind->bodies; n++) {
@@ -585,9 +586,10 @@ static int compile_outputs (compilation *job) {
                       "model %s: output \"%s\": a body, an element, another output or a column of tables has this name",
                       job->m->name, o.name);
     if ((status = compile_output_reads (job, &o)) != PW_OK) return status;
+    o.function.reads = NULL;
+    pw_open_function (&o.function, &status);
     s->output[s->outputs++] = o;
-    if (pw_open_outputs (&s->output[s->outputs - 1], 1) != PW_OK) return compile_no_memory (job);
-    s->output[s->outputs - 1].function.reads = NULL;
+    if (status != PW_OK) return compile_no_memory (job);
   }
   return PW_OK;
 }
@@ -605,18 +607,6 @@ static int compile_paths (const compilation *job) {
   return PW_OK;
 }
 
-static int compile_constant_forces (const compilation *job) {
-  pw_system *s = job->s;
-  int constant = 0;
-  for (int i = 0; i < s->batches; i++) constant |= s->batch[i].kind->constant;
-  if (!constant) return PW_OK;
-  pw_workspace *w = pw_workspace_new (s, job->error);
-  if (w == NULL) return PW_RESOURCE;
-  pw_add_constant_forces (w, s->constant);
-  pw_workspace_free (w);
-  return PW_OK;
-}
-
 static int compile_all (compilation *job) {
   int status = compile_names (job);
   if (status == PW_OK) status = pw_check_model (job->m, &job->name, job->error);
@@ -629,13 +619,12 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
-  status = compile_angle_users (job);
+  status = compile_evaluated (job);
   if (status == PW_OK) compile_metric (job->s);
   if (status == PW_OK) status = compile_limits (job);
   if (status == PW_OK) status = compile_ledger (job);
   if (status == PW_OK) status = compile_outputs (job);
-  if (status == PW_OK) status = compile_paths (job);
-  return status == PW_OK ? compile_constant_forces (job) : status;
+  return status == PW_OK ? compile_paths (job) : status;
 }
 
 pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
@@ -657,8 +646,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
 
 void pw_system_free (pw_system *s) {
   if (s == NULL) return;
-  pw_close_signals (s->source, s->source ? s->sources : 0);
-  pw_close_outputs (s->output, s->outputs);
+  pw_close_functions (s->source, s->source ? s->sources : 0, s->output, s->outputs);
   for (int i = 0; i < s->paths; i++) pw_path_close (s->path[i]);
   pw_arena_free (&s->arena);
   free (s->batch);

@@ -707,8 +707,7 @@ static void workspace_fill (pw_workspace *w, double *x) {
   w->configuration[s->bodies].cos = 1;
 }
 
-/* Opens a function unless *status reports that one could not be opened; then nothing has to be closed. */
-static void workspace_open_function (pw_function *f, int *status) {
+void pw_open_function (pw_function *f, int *status) {
   if (f->open == NULL) return;
   f->context = *status == PW_OK ? f->open (f->context) : NULL;
   if (f->context) return;
@@ -716,23 +715,12 @@ static void workspace_open_function (pw_function *f, int *status) {
   f->close = NULL;
 }
 
-void pw_close_signals (const pw_source *source, int count) {
-  for (int i = 0; i < count; i++) {
-    const pw_signal *signal = &source[i].signal;
-    if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
-      signal->function.close (signal->function.context);
+void pw_close_functions (const pw_source *source, int sources, const pw_compiled_output *output, int outputs) {
+  for (int i = 0; i < sources + outputs; i++) {
+    const pw_function *f = i < sources ? &source[i].signal.function : &output[i - sources].function;
+    if (i < sources && source[i].signal.type != PW_FUNCTION) continue;
+    if (f->open && f->close) f->close (f->context);
   }
-}
-
-int pw_open_outputs (pw_compiled_output *output, int count) {
-  int status = PW_OK;
-  for (int i = 0; i < count; i++) workspace_open_function (&output[i].function, &status);
-  return status;
-}
-
-void pw_close_outputs (const pw_compiled_output *output, int count) {
-  for (int i = 0; i < count; i++)
-    if (output[i].function.open && output[i].function.close) output[i].function.close (output[i].function.context);
 }
 
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
@@ -759,8 +747,8 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
     workspace_fill (w, x);
     int status = PW_OK;
     for (pw_source *source = w->source; source < w->source + s->sources; source++)
-      if (source->signal.type == PW_FUNCTION) workspace_open_function (&source->signal.function, &status);
-    for (int i = 0; i < s->outputs; i++) workspace_open_function (&w->output[i].function, &status);
+      if (source->signal.type == PW_FUNCTION) pw_open_function (&source->signal.function, &status);
+    for (int i = 0; i < s->outputs; i++) pw_open_function (&w->output[i].function, &status);
     if (status == PW_OK) return w;
   }
   pw_workspace_free (w);
@@ -769,8 +757,7 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
 }
 
 void pw_workspace_free (pw_workspace *w) {
-  if (w) pw_close_signals (w->source, w->s->sources);
-  if (w) pw_close_outputs (w->output, w->s->outputs);
+  if (w) pw_close_functions (w->source, w->s->sources, w->output, w->s->outputs);
   free (w);
 }
 

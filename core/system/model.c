@@ -525,25 +525,19 @@ MEMBER (const char *, pw_model_name, name)
 MEMBER (const pw_plugin_table *, pw_model_table, table)
 MEMBER (int, pw_model_initials, initials)
 
+#define LIST(type, function, member, number)             \
+  const type *function (const pw_model *m, int *count) { \
+    *count = m->number;                                  \
+    return m->member;                                    \
+  }
+LIST (pw_body, pw_model_bodies, body, bodies)
+LIST (pw_element, pw_model_elements, element, elements)
+LIST (pw_named_output, pw_model_outputs, output, outputs)
+
 double pw_model_parameter (const pw_model *m, const pw_parameter *p) {
   double value;
   memcpy (&value, m->parameters + p->offset, sizeof value);
   return value;
-}
-
-const pw_body *pw_model_bodies (const pw_model *m, int *count) {
-  *count = m->bodies;
-  return m->body;
-}
-
-const pw_element *pw_model_elements (const pw_model *m, int *count) {
-  *count = m->elements;
-  return m->element;
-}
-
-const pw_named_output *pw_model_outputs (const pw_model *m, int *count) {
-  *count = m->outputs;
-  return m->output;
 }
 
 const pw_reference_text *pw_model_reference_text (const pw_model *m) {

@@ -130,8 +130,10 @@ static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
 }
 
-/* Closes the contexts made by `open`.  Signals that have not been stored yet may be all zero. */
-void pw_close_signals (const pw_source *source, int count);
+/* Opens a function unless *status reports that one could not be opened; then nothing has to be closed. */
+void pw_open_function (pw_function *f, int *status);
+/* Closes the functions of signals, which may be all zero if they have not been stored yet, and of outputs. */
+void pw_close_functions (const pw_source *source, int sources, const pw_compiled_output *output, int outputs);
 
 /* Origin of an initial value: given by the user, which takes precedence; specified by the model; a position 0 of a body
  * that does not say which values are specified.  0: none of these. */
@@ -203,10 +205,6 @@ size_t pw_column_offset (pw_column_type type);
 /* Sets w->output_value, the outputs at a sample whose kinematics are evaluated; ledger: its entries, NULL: unknown. */
 void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *ledger);
 void pw_evaluate_contacts (const pw_workspace *w, double (*out)[3]); /* at the kinematics evaluated last */
-
-/* Opens the contexts of functions; a status.  Closes them. */
-int pw_open_outputs (pw_compiled_output *output, int count);
-void pw_close_outputs (const pw_compiled_output *output, int count);
 
 /* Stores value, first and second derivative at time t, or another argument, in source->u; of a force's signal the
  * derivatives are meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function

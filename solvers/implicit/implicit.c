@@ -32,7 +32,7 @@ void pw_implicit_close (pw_run *r) {
 int pw_implicit_restart (pw_run *r, pw_error *error) {
   pw_implicit *x = implicit_of (r);
   (void)error;
-  x->counter = (pw_step_counter){ .base = r->t };
+  r->counter = (pw_step_counter){ .base = r->t };
   x->last.start.t = r->t;
   x->h = 0;
   return PW_OK;
@@ -88,7 +88,7 @@ static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, do
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error) {
   pw_implicit *x = implicit_of (r);
   int whole;
-  const double end = pw_step_end (r, &x->counter, t_end, &whole);
+  const double end = pw_step_end (r, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
@@ -102,7 +102,7 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   r->t = t1;
   pw_dense_output_integrate_ledger (&x->last, r);
   r->statistics.steps++;
-  pw_count_step (&x->counter, whole, t1);
+  pw_count_step (r, whole, t1);
   return PW_OK;
 }
 

@@ -12,7 +12,6 @@ typedef enum { PW_ITERATE, PW_CONVERGED, PW_DIVERGED } pw_convergence;
 
 /* The data of each of these methods begin with this. */
 typedef struct {
-  pw_step_counter counter;
   double h;             /* size of the last step; 0: there is none, or it failed */
   double *q1, *v1;      /* coords: the new state */
   pw_dae dae;           /* the equations and the Newton matrix; leapfrog uses only its tangent */

@@ -258,10 +258,6 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
   return pw_implicit_complete (r, status, size, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
 }
 
-static void leapfrog_serialise (pw_run *r, pw_archive *a) {
-  pw_serialise_counter (&r->data->common.counter, a);
-}
-
 static int leapfrog_step (pw_run *r, double h, double t1) {
   int status = drift_solve (r, h, t1);
   return status == PW_OK ? kick_solve (r, h, t1) : status;
@@ -289,5 +285,5 @@ const pw_method pw_method_leapfrog = {
   .open = leapfrog_open,
   .advance = leapfrog_advance,
   PW_IMPLICIT_FUNCTIONS,
-  .serialise = leapfrog_serialise,
+  .serialise = pw_serialise_counter,
 };

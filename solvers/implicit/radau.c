@@ -89,7 +89,6 @@ struct pw_method_data {
   double *a_end;                        /* coords: accelerations at the end of the last step */
   int near_singular;                    /* 1: the state reached is near a singular configuration */
   double noise;                         /* corrections up to this, in round_off, are accepted even if they grow */
-  pw_step_counter counter;              /* of fixed steps */
   double h;                             /* adaptive: size of the next step */
   double previous_h, previous_error;    /* adaptive: size and error of the last step; 0: there is none */
   pw_projector projector;
@@ -425,7 +424,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data;
   double time_scale = r->w->scale.time;
   (void)error;
-  d->counter = (pw_step_counter){ .base = r->t };
+  r->counter = (pw_step_counter){ .base = r->t };
   d->last.t = r->t;
   d->previous_h = d->last.h = 0;
   d->remaining = 1;
@@ -574,13 +573,12 @@ static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *
 }
 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
-  pw_method_data *d = r->data;
   int whole;
-  double err, t1 = pw_step_end (r, &d->counter, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  double err, t1 = pw_step_end (r, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
   int status = radau_try (r, h, t1, 0, &err);
   if (status == PW_OK) status = radau_accept (r, h, t1);
   if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
-  pw_count_step (&d->counter, whole, t1);
+  pw_count_step (r, whole, t1);
   return PW_OK;
 }
 

@@ -31,6 +31,8 @@ typedef struct pw_dense_group {
 /* A matrix of an odd number of rows, 3 or more, has one more, that of the unit matrix, with the unknown of the first
  * row, which is stored after it. */
 typedef struct pw_dense {
+  /* Factorises S with the J last evaluated, if `factors`, whatever the pivots are.  Then, unless y is NULL, y, which
+   * holds gamma, becomes lambda, and a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
   void (*run) (struct pw_dense *d, int factors, const double *f, double *y, double *a);
   int n, groups;                 /* rows; groups */
   int unknown[PW_DENSE];         /* of each row: index in lambda */
@@ -54,12 +56,6 @@ void pw_dense_add_group (pw_dense *d, int j, int width);
 void pw_dense_add_rows (pw_dense *d, int is_pin, int first, int size, const double *J, int stride);
 void pw_dense_open (pw_dense *d);  /* selects the functions for the rows and groups described */
 void pw_dense_close (pw_dense *d); /* d may be NULL */
-
-/* Factorises S with the J last evaluated, if `factors`, whatever the pivots are.  Then, unless y is NULL, y, which
- * holds gamma, becomes lambda, and a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
-static inline void pw_dense_run (pw_dense *d, int factors, const double *f, double *y, double *a) {
-  d->run (d, factors, f, y, a);
-}
 
 /* Index in lambda of the unknown of the smallest pivot. */
 int pw_dense_least_unknown (const pw_dense *d);

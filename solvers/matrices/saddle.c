@@ -1026,7 +1026,7 @@ PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int dense, int factor
     if (factors && !((saddle->pivot = pivot) > SADDLE_ROUND_OFF)) return *least = INFINITY, PW_RETRY;
   }
   if (dense)
-    pw_dense_run (saddle->dense, factors, f, y, a);
+    saddle->dense->run (saddle->dense, factors, f, y, a);
   else if (factors)
     pw_block_factor (l);
   if (factors) {

@@ -30,9 +30,7 @@ static const double MOREAU_ROUND_OFF = 1e4 * DBL_EPSILON; /* of corrections, whi
 enum { MOREAU_MOST = 30 }; /* fixed-point iterations for the velocities in the middle of a step */
 
 struct pw_method_data {
-  pw_step_counter counter;
-  pw_step_start start; /* of the last step */
-  pw_projector projector;
+  pw_dense_output last;       /* of the last step, for its start and its projector */
   double *q, *v, *a, *lambda; /* coords + 3; the same; the same; rows */
   double *f, *da, *mu;        /* coords + 3: forces; correction of a; rows: of lambda */
   double *rate;               /* entries: powers in the middle of the step */
@@ -41,41 +39,34 @@ struct pw_method_data {
 
 static int moreau_restart (pw_run *r, pw_error *error) {
   (void)error;
-  r->data->counter = (pw_step_counter){ .base = r->t };
-  r->data->start.t = r->t;
+  r->counter = (pw_step_counter){ .base = r->t };
+  r->data->last.start.t = r->t;
   return PW_OK;
 }
 
 static int moreau_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
-  const size_t n = (size_t)r->s->coords + 3, entries = (size_t)r->entries;
+  const size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
-  const pw_array array[] = { { &d->start.q, pw_state_length (r->s) },
-                             { &d->start.ledger, entries },
-                             { &d->start.rate, entries },
-                             { &d->rate, entries },
+  const pw_array array[] = { { &d->rate, (size_t)r->entries },
                              { &d->q, n },
                              { &d->v, n },
                              { &d->a, n },
                              { &d->f, n },
                              { &d->da, n },
-                             { &d->lambda, (size_t)r->s->rows },
-                             { &d->mu, (size_t)r->s->rows } };
+                             { &d->lambda, rows },
+                             { &d->mu, rows } };
   d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return pw_fail_memory (r->s, error);
   int status = pw_impulses_open (r, error);
-  if (status == PW_OK) status = pw_projector_open (&d->projector, r, NULL, NULL, error);
+  if (status == PW_OK) status = pw_dense_output_open (&d->last, r, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
   return status == PW_OK ? moreau_restart (r, error) : status;
 }
 
 static void moreau_close (pw_run *r) {
-  pw_projector_close (&r->data->projector);
+  pw_dense_output_close (&r->data->last);
   free (r->data->memory);
   free (r->data);
-}
-
-static void moreau_serialise (pw_run *r, pw_archive *a) {
-  pw_serialise_counter (&r->data->counter, a);
 }
 
 /* q = q + h/2 (v + d->v) from the state reached. */
@@ -147,12 +138,12 @@ static int moreau_move (pw_run *r, double h) {
 /* q', v', projected, with accelerations and multipliers. */
 static int moreau_finish (pw_run *r, double t, double *added_energy) {
   pw_method_data *d = r->data;
-  if (r->events == NULL) return pw_project_state (&d->projector, r, t, d->q, d->v, d->a, d->lambda, added_energy);
+  if (r->events == NULL) return pw_project_state (&d->last.projector, r, t, d->q, d->v, d->a, d->lambda, added_energy);
   int status = pw_update_kinematics (r->w, t, d->q, d->v);
   if (status != PW_OK) return status;
   const double before = pw_energy (r, d->v);
-  status = pw_impulses_project (r, &d->projector, t, d->q, d->v);
-  if (status == PW_OK) status = pw_project_velocities (&d->projector, r, d->v);
+  status = pw_impulses_project (r, &d->last.projector, t, d->q, d->v);
+  if (status == PW_OK) status = pw_project_velocities (&d->last.projector, r, d->v);
   if (status != PW_OK) return status;
   if (added_energy) *added_energy += pw_energy (r, d->v) - before;
   pw_run_accelerate_updated (r, d->v, d->a, d->lambda);
@@ -160,7 +151,7 @@ static int moreau_finish (pw_run *r, double t, double *added_energy) {
 }
 
 static int moreau_fail (pw_run *r, int status, double h, pw_error *error) {
-  memcpy (r->ledger, r->data->start.ledger, (size_t)r->entries * sizeof *r->ledger);
+  memcpy (r->ledger, r->data->last.start.ledger, (size_t)r->entries * sizeof *r->ledger);
   if (error && error->status != PW_OK) return error->status;
   if (status < 0) return pw_fail_signal (r->t, error);
   if (pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
@@ -172,13 +163,13 @@ static int moreau_fail (pw_run *r, int status, double h, pw_error *error) {
 static int moreau_advance (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
   int whole;
-  const double t1 = pw_step_end (r, &d->counter, t_end, &whole), h = t1 - r->t, t = pw_before_breakpoint (r, t1);
+  const double t1 = pw_step_end (r, t_end, &whole), h = t1 - r->t, t = pw_before_breakpoint (r, t1);
   const size_t n = (size_t)r->s->coords * sizeof (double);
   double added_energy = 0;
-  pw_store_start (&d->start, r);
+  pw_store_start (&d->last.start, r);
   int status = moreau_move (r, h);
   if (status == PW_OK && r->events) {
-    status = pw_impulses_solve (r, &d->projector, h, t, d->q, d->v, d->a, error);
+    status = pw_impulses_solve (r, &d->last.projector, h, t, d->q, d->v, d->a, error);
     moreau_positions (r, h);
   }
   if (status == PW_OK) status = moreau_finish (r, t, r->settings.ledger ? &added_energy : NULL);
@@ -192,13 +183,13 @@ static int moreau_advance (pw_run *r, double t_end, pw_error *error) {
   pw_ledger_rates (r, r->lambda, r->rate);
   if (r->events) pw_run_set_reference_level (r); /* impacts accelerate without limit */
   r->statistics.steps++;
-  pw_count_step (&d->counter, whole, t1);
+  pw_count_step (r, whole, t1);
   return PW_OK;
 }
 
 static int moreau_interpolate (void *data, pw_run *r, double t) {
   pw_method_data *d = data;
-  const pw_step_start *start = &d->start;
+  const pw_step_start *start = &d->last.start;
   const double *q0 = start->q, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
   const double h = r->t - start->t, x = (t - start->t) / h;
   for (int j = 0; j < r->s->coords; j++) {
@@ -210,12 +201,12 @@ static int moreau_interpolate (void *data, pw_run *r, double t) {
   for (int i = 0; i < r->s->rows; i++) r->lambda_at[i] = lambda0[i] + x * (r->lambda[i] - lambda0[i]);
   for (int i = 0; i < r->entries; i++) r->ledger_at[i] = start->ledger[i] + x * (r->ledger[i] - start->ledger[i]);
   r->projected_at = start->projected + x * (r->projected - start->projected);
-  int status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at);
-  return status == PW_OK ? pw_project_velocities (&d->projector, r, r->v_at) : status;
+  int status = pw_project_positions (&d->last.projector, r, t, r->q_at, r->v_at);
+  return status == PW_OK ? pw_project_velocities (&d->last.projector, r, r->v_at) : status;
 }
 
 static int moreau_at (pw_run *r, double t, pw_error *error) {
-  return pw_sample_last_step (r, r->data->start.t, t, moreau_interpolate, r->data, error);
+  return pw_sample_last_step (r, r->data->last.start.t, t, moreau_interpolate, r->data, error);
 }
 
 const pw_method pw_method_moreau = {
@@ -235,5 +226,5 @@ const pw_method pw_method_moreau = {
   .at = moreau_at,
   .restart = moreau_restart,
   .close = moreau_close,
-  .serialise = moreau_serialise,
+  .serialise = pw_serialise_counter,
 };

@@ -36,8 +36,7 @@ struct pw_method_data {
   int holds_signals;           /* 1: signals of forces are constant over a step */
   pw_projector projector;
   rk_nullspace nullspace;
-  pw_step_counter counter; /* of fixed steps */
-  int off_grid;            /* 1: the last step was divided and ended between the multiples of the step size */
+  int off_grid; /* 1: the last step was divided and ended between the multiples of the step size */
   /* velocities, accelerations, and rates of the ledger's entries at the stages, then at the new state */
   double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], *stage_rate[PW_RK_STAGES];
   double *q, *v, *a, *lambda; /* the new state, laid out as in pw_run; before: q, lambda of a stage */
@@ -600,7 +599,7 @@ static int rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
   int whole, project = rk_projects_next (r);
   const int was_off_grid = d->off_grid;
-  double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);
+  double added_energy = 0, t1 = pw_step_end (r, t_end, &whole);
   double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;
   int status = rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
   int ends_singular =
@@ -614,12 +613,12 @@ static int rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
     return status;
   }
   r->statistics.steps++;
-  if (d->off_grid) { /* `counter` counts it with the next step, to the next multiple */
-    if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);
+  if (d->off_grid) { /* r->counter counts it with the next step, to the next multiple */
+    if (t > t1) r->counter.count = (long)floor ((t - r->counter.base) / r->settings.step);
     return PW_OK;
   }
   rk_accept (r, h, t1, added_energy);
-  pw_count_step (&d->counter, whole, t1);
+  pw_count_step (r, whole, t1);
   return PW_OK;
 }
 
@@ -908,7 +907,7 @@ void pw_rk_close (pw_run *r) {
 int pw_rk_restart (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data;
   (void)error;
-  d->counter = (pw_step_counter){ .base = r->t };
+  r->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
   if (!r->fixed_steps) {
     d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
@@ -921,7 +920,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
 
 void pw_rk_serialise (pw_run *r, pw_archive *a) {
   pw_method_data *d = r->data;
-  pw_serialise_counter (&d->counter, a);
+  pw_serialise_counter (r, a);
   pw_archive_bytes (a, &d->off_grid, sizeof d->off_grid);
   pw_archive_bytes (a, &d->h, sizeof d->h);
   pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
@@ -952,14 +951,13 @@ static int several_possible (const pw_run *r) {
  * breakpoint, with the tolerance of pw_step_end; up to the first that reaches t; up to the next look at coordinates
  * that are too large (run.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
-  const pw_method_data *d = r->data;
   const double h = r->settings.step, longer = PW_STEP_LONGER * h,
                last = fmin (r->breakpoint, r->resolved_until) - longer, stop = fmin (t_end - longer, last),
                shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
   while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->checked_span) {
-    double next = d->counter.base + (double)(d->counter.count + n + 1) * h;
+    double next = r->counter.base + (double)(r->counter.count + n + 1) * h;
     if (!(next <= stop || (next == t_end && next <= last)) || !(h > shortest * fabs (next))) break;
     reached = next, n++;
   }
@@ -989,7 +987,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   pw_watchdog *watch = &r->watchdog;
   r->t = x->t;
   d->last.t = x->t0, d->last.projected = r->projected;
-  d->counter.count += x->done;
+  r->counter.count += x->done;
   r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
   now->steps += x->done;
@@ -1011,7 +1009,7 @@ static int several_plan (pw_run *r, double t, double t_end, int least, pw_scene_
   if (count < least) return 0;
   *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
   x->stages = d->tableau->stages, x->row = d->row, x->c = d->tableau->c;
-  x->h = r->settings.step, x->base = d->counter.base, x->number = d->counter.count;
+  x->h = r->settings.step, x->base = r->counter.base, x->number = r->counter.count;
   x->t = r->t, x->state = r->q, x->ledger = r->ledger, x->rate = r->rate;
   x->state0 = d->last.q, x->ledger0 = d->last.ledger, x->rate0 = d->last.rate;
   x->V = d->stage_v, x->A = d->stage_a, x->R = d->stage_rate;

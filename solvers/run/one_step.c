@@ -6,8 +6,7 @@
 
 struct pw_method_data {
   pw_dense_output last;
-  int projects; /* with the projector of `last` */
-  pw_step_counter counter;
+  int projects;       /* with the projector of `last` */
   double end;         /* of the step whose size was last requested */
   int whole;          /* 1: that end is a multiple of the step size */
   double *a, *lambda; /* of the new state */
@@ -27,7 +26,7 @@ double pw_stage_time (const pw_run *r, double t) {
 int pw_step_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  d->counter = (pw_step_counter){ .base = r->t };
+  r->counter = (pw_step_counter){ .base = r->t };
   d->last.start.t = r->t;
   return PW_OK;
 }
@@ -54,7 +53,7 @@ void pw_step_close (pw_run *r) {
 }
 
 void pw_step_serialise (pw_run *r, pw_archive *a) {
-  pw_serialise_counter (&r->data->counter, a);
+  pw_serialise_counter (r, a);
 }
 
 double *pw_step_array (pw_run *r, int i) {
@@ -63,7 +62,7 @@ double *pw_step_array (pw_run *r, int i) {
 
 double pw_step_size (pw_run *r, double t_end) {
   struct pw_method_data *d = r->data;
-  d->end = pw_step_end (r, &d->counter, t_end, &d->whole);
+  d->end = pw_step_end (r, t_end, &d->whole);
   return d->end - r->t;
 }
 
@@ -100,7 +99,7 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
   pw_dense_output_integrate_ledger (&d->last, r);
   r->statistics.steps++;
-  pw_count_step (&d->counter, requested && d->whole, t1);
+  pw_count_step (r, requested && d->whole, t1);
   return PW_OK;
 }
 

@@ -47,7 +47,9 @@ void pw_run_set_references (pw_run *r) {
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
   char signal[PW_NAME_BYTES];
-  double next = pw_run_next_breakpoint (r, r->t);
+  /* with kinks for methods of order > 2: lower orders do not suffer from a kink inside a step, and multistep methods
+   * (order 0) lose more by a restart */
+  double next = pw_next_breakpoint (r->w, r->method->order > 2, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
     return PW_OK;
