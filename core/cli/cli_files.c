@@ -252,12 +252,6 @@ int pw_files_finish (pw_cli_line *line, pw_error *error) {
   return status;
 }
 
-void pw_files_close (pw_files *files) {
-  for (int i = 0; i < PW_FILES; i++)
-    if (files->output[i]) pw_output_discard (files->output[i]);
-  pw_folder_close (&files->folder);
-}
-
 void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value) {
   pw_text_add (t, key);
   if (name) pw_text_add (t, " "), pw_text_add (t, name);

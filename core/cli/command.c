@@ -142,7 +142,9 @@ static int command_read (const pw_command *command, const pw_command *const *all
 }
 
 static void command_close (pw_cli_line *line) {
-  pw_files_close (&line->files);
+  for (int i = 0; i < PW_FILES; i++) /* files that have not been completed */
+    if (line->files.output[i]) pw_output_discard (line->files.output[i]);
+  pw_folder_close (&line->files.folder);
   pw_arena_free (&line->arena);
   pw_cli_close_model (&line->m);
   for (pw_file **f = line->method_file; f && *f; f++) pw_file_close (*f);

@@ -10,7 +10,7 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#include "expression_parts.h"
+#include "expression.h"
 
 #define SIDE_ROUND_OFF (16 * DBL_EPSILON) /* of a condition's operands */
 
@@ -559,7 +559,7 @@ void pw_expression_run_jet (const pw_expression *expression, const double *varia
   jet stack[PW_EXPRESSION_STACK], *top = stack;
   for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
     int operands = pw_expression_operands (c->op);
-    double side = 0; /* see `discrete` in expression_parts.h */
+    double side = 0; /* see `discrete` in expression.h */
     top -= operands;
     if (operands == 0)
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }

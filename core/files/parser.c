@@ -12,7 +12,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include "expression_parts.h"
+#include "expression.h"
 #include "files.h"
 
 #define DIGITS "0123456789"

@@ -2,7 +2,6 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include "expression_parts.h"
 #include "yaml_read.h"
 
 /* ---- Signals that are expressions ----

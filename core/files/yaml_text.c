@@ -116,16 +116,15 @@ static void unit_replace (char unit[UNIT_BYTES], const pw_unit_name *other, cons
   snprintf (conversion, 40, power == 1 ? "%c%s" : "%c%s^%d", divides ? '/' : '*', other->factor, power);
 }
 
-/* Refuses a unit that contains this other unit than an SI unit, and says how to convert the value. */
-static int unit_refuse (const pw_yaml *y, const pw_node *node, const pw_node *value, const pw_unit_name *other,
-                        pw_error *error) {
-  const char *unit = node->text;
+int pw_yaml_check_unit (const pw_yaml *y, const pw_node *node, const pw_node *value, pw_error *error) {
   static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
   char si[UNIT_BYTES], conversion[40];
-  const char *at;
+  const char *at, *unit = node->text, *in = strstr (unit, " in "); /* "persons in lane": no inches, unless a product */
+  const pw_unit_name *other = pw_yaml_other_unit (unit, &at);
   double factor;
   int replaced = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
                              pw_expression_number (value->text, &(double){ 0 });
+  if (other == NULL || (in && at == in + 1 && pw_unit_factor (unit, NULL, &factor) != PW_OK)) return PW_OK;
   if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
     pw_unit_factor (other->name, other->si, &factor);
     return pw_yaml_fail (y, error, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why,
@@ -136,13 +135,6 @@ static int unit_refuse (const pw_yaml *y, const pw_node *node, const pw_node *va
   if (replaced > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
   return pw_yaml_fail (y, error, node->at, "%s; write \"value: %s%s, unit: %s\"", why, number ? value->text : "(..)",
                        conversion, si);
-}
-
-int pw_yaml_check_unit (const pw_yaml *y, const pw_node *node, const pw_node *value, pw_error *error) {
-  const char *at, *unit = node->text, *in = strstr (unit, " in "); /* "persons in lane": no inches, unless a product */
-  const pw_unit_name *other = pw_yaml_other_unit (unit, &at);
-  if (other == NULL || (in && at == in + 1 && pw_unit_factor (unit, NULL, &(double){ 0 }) != PW_OK)) return PW_OK;
-  return unit_refuse (y, node, value, other, error);
 }
 
 /* Trees of text models as bytes, for programs without libfyaml: interactive pages.  A node is its type, whether it is

@@ -119,7 +119,8 @@ static int unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double 
   return m->system ? PW_OK : error->status;
 }
 
-int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+/* Compiles the model and sets m and settings. */
+static int unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
   const pw_specialised *code = pw_scene_code_table (u->engine.code);
   *to = (pw_unknown_run){ .settings = u->settings, .limit = { .seconds = u->limit } };
   if (unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
@@ -130,7 +131,7 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
 }
 
 int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
-  if (pw_unknown_run_prepare (to, u, x, error) != PW_OK) return error->status;
+  if (unknown_run_prepare (to, u, x, error) != PW_OK) return error->status;
   to->run = pw_limit_open (to->m.system, u->method, &to->settings, error);
   return to->run ? PW_OK : error->status;
 }
@@ -170,7 +171,7 @@ int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *v
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
   const pw_outcome_table rows = { outputs->t, outputs->rows, table };
-  int status = pw_unknown_run_prepare (&run, outputs->unknowns, x, error);
+  int status = unknown_run_prepare (&run, outputs->unknowns, x, error);
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, outputs->option, outputs->of, outputs->count,
                                outputs->unknowns->line->until, error);

@@ -48,13 +48,11 @@ int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error
 typedef struct {
   pw_cli_model m;
   pw_settings settings;
-  pw_limit limit; /* set by pw_unknown_run_prepare */
+  pw_limit limit; /* settings.stop_context */
   pw_run *run;
 } pw_unknown_run;
-/* Compiles the model and sets m and settings, with the engine and a limit of its own; the caller opens `run`.  *to must
- * not move, since settings points to its limit.  Close it in every case. */
-int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
-/* The same, and opens the run. */
+/* Opens a run with the engine and a limit of its own.  *to must not move, since settings points to its limit.  Close it
+ * in every case. */
 int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_run_close (pw_unknown_run *run);
 

@@ -198,21 +198,8 @@ pw_plot_link *pw_plot_accompanied (const pw_plots *plots, const pw_element_info 
 void pw_plot_find_shapes (pw_plots *plots);
 /* 1 if attachment point k is not a corner of the hull. */
 int pw_plot_inside (const pw_plot_body *shape, int k);
-/* A rectangle [m]. */
-typedef struct {
-  double x0, x1, y0, y1;
-} pw_plot_box;
-#define PLOT_EMPTY ((pw_plot_box){ INFINITY, -INFINITY, INFINITY, -INFINITY })
-/* The smallest box around the points of the ground. */
-pw_plot_box pw_plot_ground (const pw_plots *plots);
-/* Extends a box by all attachment points, centres of mass and wheels of sample i; returns its diagonal [m]. */
-double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i);
-/* Sets size and symbol_unit from the first sample. */
-void pw_plot_measure (pw_plots *plots);
 /* A point of a body in the inertial frame [m]; placement: x, y, phi of the body; at: the point in its frame. */
 void pw_plot_point (const double *placement, const double *at, double out[2]);
-/* x, y and angle of a disc at sample i, in the inertial frame [m], [rad]. */
-void pw_plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *disc, double out[3]);
 /* End n of a link at sample i, in the inertial frame [m]. */
 void pw_plot_end (const pw_plots *plots, int i, const pw_plot_link *link, int n, double out[2]);
 
@@ -227,7 +214,5 @@ void pw_plot_place (const pw_plots *plots, int i, const pw_plot_link *link, cons
                     double (*out)[2]);
 /* The field `heading` of an element [rad]; 0 if it has none. */
 double pw_plot_heading (const pw_plot_link *link);
-/* Fx, Fy of each link [N]; 0 if its force is not drawn. */
-void pw_plot_forces (const pw_plots *plots, const pw_sample *sample, double *out);
 
 #endif

@@ -128,6 +128,96 @@ void pw_plots_close (pw_plots *plots) {
   free (plots);
 }
 
+/* Fx, Fy of each link [N]; 0 if its force is not drawn. */
+static void plot_forces (const pw_plots *plots, const pw_sample *sample, double *out) {
+  if (pw_workspace_forces (plots->workspace, sample->t, sample->q, sample->v, sample->lambda, plots->forces, NULL) !=
+      PW_OK)
+    return;
+  for (int i = 0; i < plots->links; i++, out += 2) {
+    const pw_plot_link *link = &plots->link[i];
+    const double *force = plots->forces + link->force_offset, *more = plots->forces + link->companion_offset;
+    for (int k = 0; k < 2; k++)
+      out[k] = link->force_end < 0 ? 0 : force[k] + (link->companion_offset < 0 ? 0 : more[k]);
+  }
+}
+
+/* A rectangle [m]. */
+typedef struct {
+  double x0, x1, y0, y1;
+} plot_box;
+#define PLOT_EMPTY ((plot_box){ INFINITY, -INFINITY, INFINITY, -INFINITY })
+
+static void box_extend (plot_box *box, const double *point) {
+  if (!isfinite (point[0]) || !isfinite (point[1])) return;
+  *box = (plot_box){ fmin (box->x0, point[0]), fmax (box->x1, point[0]), fmin (box->y0, point[1]),
+                     fmax (box->y1, point[1]) };
+}
+
+/* x, y and angle of a disc at sample i, in the inertial frame [m], [rad]. */
+static void plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *disc, double out[3]) {
+  const double *placement =
+      disc->body < 0 ? (const double[3]){ 0 } : pw_plot_track (plots, i, &plots->bodies, disc->body);
+  pw_plot_point (placement, disc->at, out);
+  out[2] = placement[2];
+}
+
+static void box_extend_discs (plot_box *box, const pw_plots *plots, int i, int ground) {
+  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
+    double at[3], r = disc->at[2];
+    if ((disc->body == PLOT_GROUND) != ground) continue;
+    plot_disc_centre (plots, i, disc, at);
+    box_extend (box, (const double[]){ at[0] - r, at[1] - r });
+    box_extend (box, (const double[]){ at[0] + r, at[1] + r });
+  }
+}
+
+/* The smallest box around the points of the ground. */
+static plot_box box_ground (const pw_plots *plots) {
+  plot_box box = PLOT_EMPTY;
+  for (int g = 0; g < plots->grounds; g++) box_extend (&box, plots->ground[g]);
+  box_extend_discs (&box, plots, 0, 1);
+  return box;
+}
+
+/* Extends a box by all attachment points, centres of mass and wheels of sample i; returns its diagonal [m]. */
+static double box_extend_all (plot_box *box, const pw_plots *plots, int i) {
+  for (int k = 0; k < plots->bodies.drawn; k++) {
+    const double *motion = pw_plot_track (plots, i, &plots->bodies, k);
+    box_extend (box, motion);
+    for (int n = 0; n < plots->shape[k].attachments; n++) {
+      double point[2];
+      pw_plot_point (motion, plots->shape[k].attachment[n], point);
+      box_extend (box, point);
+    }
+    for (int n = 0; n < plots->shape[k].corners; n++) {
+      double point[2];
+      pw_plot_point (motion, plots->shape[k].corner[n], point);
+      box_extend (box, point);
+    }
+  }
+  for (int w = 0; w < plots->wheels.drawn; w++) box_extend (box, pw_plot_track (plots, i, &plots->wheels, w));
+  box_extend_discs (box, plots, i, 0);
+  return box->x1 >= box->x0 ? hypot (box->x1 - box->x0, box->y1 - box->y0) : 0;
+}
+
+/* The unit of symbols, relative to the size of the mechanism or, if that is less, 4 times the reach of its bodies. */
+#define SHAPES_UNIT 0.035
+
+/* Sets size and symbol_unit from the first sample. */
+static void plot_measure (pw_plots *plots) {
+  plot_box box = box_ground (plots);
+  double reach = 0, size = box_extend_all (&box, plots, 0); /* reach: farthest point of a body */
+  for (const pw_plot_body *shape = plots->shape; shape < plots->shape + plots->bodies.drawn; shape++) {
+    for (int k = 0; k < shape->attachments; k++)
+      reach = fmax (reach, hypot (shape->attachment[k][0], shape->attachment[k][1]));
+    for (int k = 0; k < shape->corners; k++) reach = fmax (reach, hypot (shape->corner[k][0], shape->corner[k][1]));
+  }
+  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++)
+    if (disc->body >= 0) reach = fmax (reach, hypot (disc->at[0], disc->at[1]) + disc->at[2]);
+  plots->size = size > 0 ? size : pw_system_length (plots->system);
+  plots->symbol_unit = SHAPES_UNIT * (reach > 0 ? fmin (plots->size, 4 * reach) : plots->size);
+}
+
 double pw_plots_next (const pw_plots *plots) {
   if (plots->samples == plots->planned) return INFINITY;
   return plots->samples + 1 == plots->planned ? plots->t_end : plots->t_end * plots->samples / (plots->planned - 1);
@@ -157,9 +247,9 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
     pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] = o < states       ? state[o]
                                                                          : sample->output ? sample->output[o - states]
                                                                                           : NAN;
-  if (i == 0) pw_plot_measure (plots);
+  if (i == 0) plot_measure (plots);
   if (plots->with_forces && plots->links > 0)
-    pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
+    plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
 }
 
 void pw_plots_last (pw_plots *plots, const pw_sample *sample) {
@@ -188,7 +278,7 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
   if (archive->failed) return;
   plots->samples = samples;
   pw_archive_bytes (archive, plots->data, (size_t)samples * (size_t)plots->sample_size * sizeof *plots->data);
-  if (samples > 0) pw_plot_measure (plots);
+  if (samples > 0) plot_measure (plots);
 }
 
 /* The figures of a run: data files, plain columns with a comment line of names and units at the top, and scripts. */
@@ -214,15 +304,15 @@ static void data_row (FILE *f, const double *value, int count, const char *end) 
 /* Number of initial samples in a close-up, a separate panel for a mechanism that travels so far that it is small in a
  * figure of the whole run; 0: none.  A single point has no size. */
 static int data_closeup (const pw_plots *plots) {
-  pw_plot_box all = pw_plot_ground (plots), first = PLOT_EMPTY;
+  plot_box all = box_ground (plots), first = PLOT_EMPTY;
   double diagonal = 0;
   int n = 0, extended = plots->wheels.drawn > 0;
   for (int b = 0; b < plots->bodies.drawn; b++)
     extended |= plots->shape[b].attachments > 0 || plots->shape[b].corners > 0;
   if (!extended) return 0;
-  for (int i = 0; i < plots->samples; i++) diagonal = pw_plot_extend (&all, plots, i);
+  for (int i = 0; i < plots->samples; i++) diagonal = box_extend_all (&all, plots, i);
   if (diagonal < FIGURES_FAR * plots->size) return 0;
-  while (n < plots->samples && pw_plot_extend (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;
+  while (n < plots->samples && box_extend_all (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;
   return n < FIGURES_CLOSEUP ? 0 : n;
 }
 
@@ -258,7 +348,7 @@ static void data_segment (FILE *f, const double *from, const double *to, double 
 static void data_discs (FILE *f, const pw_plots *plots, int i) {
   double t = pw_plot_sample (plots, i)[PLOT_T], at[3], point[2];
   for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
-    pw_plot_disc_centre (plots, i, disc, at);
+    plot_disc_centre (plots, i, disc, at);
     if (disc->body >= 0) data_vertex (f, at, t, disc->body, "\n");
     for (int k = 0; k <= FIGURES_SIDES; k++) {
       pw_plot_point (at,

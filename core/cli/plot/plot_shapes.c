@@ -1,11 +1,8 @@
-/* Shapes of bodies in figures and animations, and the elements drawn between them (links), with their forces. */
+/* Shapes of bodies in figures and animations, and the elements drawn between them (links). */
 #include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 #include "plot.h"
-
-/* The unit of symbols, relative to the size of the mechanism or, if that is less, 4 times the reach of its bodies. */
-#define SHAPES_UNIT 0.035
 
 static int shapes_order (const void *a, const void *b) {
   const double *p = a, *q = b;
@@ -190,86 +187,10 @@ void pw_plot_find_shapes (pw_plots *plots) {
   }
 }
 
-void pw_plot_forces (const pw_plots *plots, const pw_sample *sample, double *out) {
-  if (pw_workspace_forces (plots->workspace, sample->t, sample->q, sample->v, sample->lambda, plots->forces, NULL) !=
-      PW_OK)
-    return;
-  for (int i = 0; i < plots->links; i++, out += 2) {
-    const pw_plot_link *link = &plots->link[i];
-    const double *force = plots->forces + link->force_offset, *more = plots->forces + link->companion_offset;
-    for (int k = 0; k < 2; k++)
-      out[k] = link->force_end < 0 ? 0 : force[k] + (link->companion_offset < 0 ? 0 : more[k]);
-  }
-}
-
 void pw_plot_point (const double *placement, const double *at, double out[2]) {
   double c = cos (placement[2]), s = sin (placement[2]);
   out[0] = placement[0] + c * at[0] - s * at[1];
   out[1] = placement[1] + s * at[0] + c * at[1];
-}
-
-static void box_extend (pw_plot_box *box, const double *point) {
-  if (!isfinite (point[0]) || !isfinite (point[1])) return;
-  *box = (pw_plot_box){ fmin (box->x0, point[0]), fmax (box->x1, point[0]), fmin (box->y0, point[1]),
-                        fmax (box->y1, point[1]) };
-}
-
-void pw_plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *disc, double out[3]) {
-  const double *placement =
-      disc->body < 0 ? (const double[3]){ 0 } : pw_plot_track (plots, i, &plots->bodies, disc->body);
-  pw_plot_point (placement, disc->at, out);
-  out[2] = placement[2];
-}
-
-static void box_extend_discs (pw_plot_box *box, const pw_plots *plots, int i, int ground) {
-  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
-    double at[3], r = disc->at[2];
-    if ((disc->body == PLOT_GROUND) != ground) continue;
-    pw_plot_disc_centre (plots, i, disc, at);
-    box_extend (box, (const double[]){ at[0] - r, at[1] - r });
-    box_extend (box, (const double[]){ at[0] + r, at[1] + r });
-  }
-}
-
-pw_plot_box pw_plot_ground (const pw_plots *plots) {
-  pw_plot_box box = PLOT_EMPTY;
-  for (int g = 0; g < plots->grounds; g++) box_extend (&box, plots->ground[g]);
-  box_extend_discs (&box, plots, 0, 1);
-  return box;
-}
-
-double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i) {
-  for (int k = 0; k < plots->bodies.drawn; k++) {
-    const double *motion = pw_plot_track (plots, i, &plots->bodies, k);
-    box_extend (box, motion);
-    for (int n = 0; n < plots->shape[k].attachments; n++) {
-      double point[2];
-      pw_plot_point (motion, plots->shape[k].attachment[n], point);
-      box_extend (box, point);
-    }
-    for (int n = 0; n < plots->shape[k].corners; n++) {
-      double point[2];
-      pw_plot_point (motion, plots->shape[k].corner[n], point);
-      box_extend (box, point);
-    }
-  }
-  for (int w = 0; w < plots->wheels.drawn; w++) box_extend (box, pw_plot_track (plots, i, &plots->wheels, w));
-  box_extend_discs (box, plots, i, 0);
-  return box->x1 >= box->x0 ? hypot (box->x1 - box->x0, box->y1 - box->y0) : 0;
-}
-
-void pw_plot_measure (pw_plots *plots) {
-  pw_plot_box box = pw_plot_ground (plots);
-  double reach = 0, size = pw_plot_extend (&box, plots, 0); /* reach: farthest point of a body */
-  for (const pw_plot_body *shape = plots->shape; shape < plots->shape + plots->bodies.drawn; shape++) {
-    for (int k = 0; k < shape->attachments; k++)
-      reach = fmax (reach, hypot (shape->attachment[k][0], shape->attachment[k][1]));
-    for (int k = 0; k < shape->corners; k++) reach = fmax (reach, hypot (shape->corner[k][0], shape->corner[k][1]));
-  }
-  for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++)
-    if (disc->body >= 0) reach = fmax (reach, hypot (disc->at[0], disc->at[1]) + disc->at[2]);
-  plots->size = size > 0 ? size : pw_system_length (plots->system);
-  plots->symbol_unit = SHAPES_UNIT * (reach > 0 ? fmin (plots->size, 4 * reach) : plots->size);
 }
 
 /* Symbols of elements in figures, and the hatching of the ground.

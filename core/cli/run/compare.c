@@ -179,7 +179,8 @@ static int reference_run (void *context, int i, pw_error *error) {
   pw_study *study = candidate->study;
   double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->settings.span / REFERENCE_FEWEST;
   pw_error run_error = { 0 };
-  int status = pw_motion_open (&candidate->motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, error);
+  int status =
+      pw_motion_open (&candidate->motion, study->line.m.system, NULL, MOTION_SAMPLES, study->settings.span, error);
   if (status != PW_OK) return status;
   status = PW_RETRY;
   while (status != PW_OK && candidate->row.level <= loosest) {
@@ -694,9 +695,9 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   }
   row->balance = NAN;
   pw_motion motion; /* at the times of the reference */
-  int status = compare->reference.known
-                   ? pw_motion_open_at (&motion, study->line.m.system, &compare->reference.motion, &run_error)
-                   : pw_motion_open (&motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, &run_error);
+  int status =
+      pw_motion_open (&motion, study->line.m.system, compare->reference.known ? &compare->reference.motion : NULL,
+                      MOTION_SAMPLES, study->settings.span, &run_error);
   if (status == PW_OK) status = compare_run (study, row, &motion, &run_error);
   if (status == PW_OK) compare_set_errors (compare, &motion, row);
   pw_motion_close (&motion);

@@ -4,19 +4,16 @@
 #include <string.h>
 #include "motion.h"
 
-int pw_motion_open (pw_motion *motion, const pw_system *system, int times, double t_end, pw_error *error) {
+int pw_motion_open (pw_motion *motion, const pw_system *system, const pw_motion *at, int times, double t_end,
+                    pw_error *error) {
   int width = 2 * pw_system_coordinates (system) + pw_system_rows (system);
+  if (at) times = at->times;
   *motion = (pw_motion){ .t = calloc ((size_t)times * (size_t)(1 + width), sizeof *motion->t) };
   if (motion->t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   motion->times = times, motion->width = width, motion->value = motion->t + times;
   pw_equal_times (t_end, times, motion->t);
+  if (at) memcpy (motion->t, at->t, (size_t)times * sizeof *motion->t);
   return PW_OK;
-}
-
-int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_motion *other, pw_error *error) {
-  int status = pw_motion_open (motion, system, other->times, 0, error);
-  if (status == PW_OK) memcpy (motion->t, other->t, (size_t)motion->times * sizeof *motion->t);
-  return status;
 }
 
 void pw_motion_close (pw_motion *motion) {
@@ -160,7 +157,7 @@ static int table_select (const motion_table *table, const pw_system *system, pw_
   if (*t_end == 0) *t_end = last;
   if (rows == 0)
     return pw_fail (error, PW_INPUT, "%s: no row between 0 and the final time, t = %s s", path, PW_DIGITS (*t_end, 9));
-  if (pw_motion_open (motion, system, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error) != PW_OK)
+  if (pw_motion_open (motion, system, NULL, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error) != PW_OK)
     return error->status;
   for (int i = 0; i < room; i++) {
     const int k = motion->taken;
@@ -190,7 +187,7 @@ int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, c
     pw_arena_free (&table.arena);
     return status;
   }
-  status = pw_motion_open (motion, system, MOTION_SAMPLES, *t_end, error);
+  status = pw_motion_open (motion, system, NULL, MOTION_SAMPLES, *t_end, error);
   for (; motion->taken < motion->times && status == PW_OK; motion->taken++) {
     double *state = pw_motion_at (motion, motion->taken);
     for (int j = 2 * n; j < motion->width; j++) state[j] = NAN; /* multipliers are not known */

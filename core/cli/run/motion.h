@@ -36,10 +36,10 @@ static inline void pw_equal_times (double t_end, int times, double *t) {
   for (int k = 0; k < times; k++) t[k] = k + 1 < times ? t_end * (k + 1) / times : t_end;
 }
 
-/* Opens a motion of 1 to MOTION_SAMPLES times, t_end / times, ..., t_end, without samples.  Errors: PW_RESOURCE. */
-int pw_motion_open (pw_motion *motion, const pw_system *system, int times, double t_end, pw_error *error);
-/* The same at the times of another motion. */
-int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_motion *other, pw_error *error);
+/* Opens a motion without samples, with the times of another motion or, if `at` is NULL, 1 to MOTION_SAMPLES times,
+ * t_end / times, ..., t_end.  Errors: PW_RESOURCE. */
+int pw_motion_open (pw_motion *motion, const pw_system *system, const pw_motion *at, int times, double t_end,
+                    pw_error *error);
 void pw_motion_close (pw_motion *motion);
 /* The time of the next sample; INFINITY if there is none. */
 double pw_motion_next_time (const pw_motion *motion);

@@ -111,7 +111,7 @@ static int comparison_open (pw_comparison *comparison, const pw_cli_line *line, 
   int status = pw_motion_open_reference (&comparison->reference, &line->m, path, &t_end, error);
   if (status != PW_OK) return status;
   pw_motion_gaps (line->m.system, &comparison->reference, 1, comparison->gaps);
-  return pw_motion_open_at (&comparison->motion, line->m.system, &comparison->reference, error);
+  return pw_motion_open (&comparison->motion, line->m.system, &comparison->reference, 0, 0, error);
 }
 
 static void comparison_close (pw_comparison *comparison) {

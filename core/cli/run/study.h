@@ -112,8 +112,6 @@ struct pw_study {
   const char *scripts[FIGURE_SCRIPTS + 1]; /* of figures, ended by NULL */
 };
 
-/* ---- The study ---- */
-
 /* Runs a command whose options begin with a pw_study. */
 int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error);
 
@@ -147,8 +145,6 @@ void pw_study_progress (pw_study *study, pw_row *row, double part);
 /* Stores the time reached, the counts and, if the last pw_study_run of the row failed, its failure: `status` and
  * `run_error` are what that returned.  Returns PW_OK, or the status that ends the study. */
 int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error);
-
-/* ---- Figures ---- */
 
 /* Adds to a panel the curves of a group that have points: their coordinate y over x. */
 void pw_study_add_curves (const pw_study *study, int group, pw_curves *c, int x, int y);
