@@ -143,10 +143,10 @@ int pw_decision_contradicts (const pw_decision *d) {
 }
 
 int pw_decision_pivot (pw_decision *d, int skips) {
-  const int n = d->n;
+  const int n = d->n, last = 50 * (n + 1) - 1;
   int changed = -1, before = 0; /* the last equation that changed its mode, and its mode before */
   for (int k = 0; k < n; k++) d->blocked[k] = 0;
-  for (int pass = 0; pass < 50 * (n + 1); pass++) {
+  for (int pass = 0; pass <= last; pass++) {
     int worst = -1, to = 0, next = 0;
     double most = 0;
     decision_set_given (d);
@@ -160,7 +160,7 @@ int pw_decision_pivot (pw_decision *d, int skips) {
       const double violation = d->blocked[k] ? 0 : decision_violation (d, k, size, &next);
       if (violation > most) most = violation, worst = k, to = next;
     }
-    if (worst < 0) return PW_OK;
+    if (worst < 0 || (pass == last && most <= DECISION_ROUND_OFF * size)) return PW_OK; /* round-off may be a cycle */
     if (to != 0) memset (d->blocked, 0, (size_t)n); /* fewer hold: others may be independent now */
     changed = worst, before = d->trial[worst];
     d->trial[worst] = (signed char)to;

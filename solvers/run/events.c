@@ -307,7 +307,7 @@ static int events_stop_at (pw_run *r, double t, pw_error *error) {
   if (status != PW_OK) return status;
   events_trigger (r, x->now);
   x->pending = 1, x->start_t = NAN;
-  if (!x->fell) memset (x->struck, 0, (size_t)x->count);
+  for (int i = 0; i < x->count && !x->fell; i++) x->struck[i] &= x->mode[i] != 0 && !x->armed[i];
   if (t == r->t) return PW_OK;
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
   memcpy (r->ledger, r->ledger_at, (size_t)r->entries * sizeof *r->ledger);
@@ -614,7 +614,11 @@ static void impulses_list (pw_run *r, double h, const double *g) {
       x->rests[i] = before > -PW_MODES_SLOW || x->limit[i].restitution == 0;
     }
     x->d.b[x->d.n] = x->u[i] + (x->rests[i] ? 0 : x->limit[i].restitution * x->u_before[i]);
-    pw_modes_add (x, i, h * (x->limit[i].least - x->mean[i]), h * (x->limit[i].most - x->mean[i]), x->mode[i]);
+    /* friction that slides has its sliding limit from the beginning: others need not balance the larger one */
+    const int slides = one_sided ? 0 : x->mode[i];
+    const double lo = slides < 0 ? x->limit[i].sliding[0] : x->limit[i].least;
+    const double hi = slides > 0 ? x->limit[i].sliding[1] : x->limit[i].most;
+    pw_modes_add (x, i, h * (lo - x->mean[i]), h * (hi - x->mean[i]), x->mode[i]);
   }
 }
 

@@ -104,6 +104,29 @@ TEST (ball_rests) {
   }
 }
 
+/* A body slides on a point beside its centre of mass: the torque of 0.5 N m is less than that with which it sticks. */
+SCENE (moreau_two_frictions) {
+  pw_add_body (m, &(pw_body){ .name = "sled", .mass = 1, .inertia = 1, .rate = { 2 } });
+  pw_add_sliding_friction (m, &(pw_sliding_friction){ .name = "rub",
+                                                      .body = { "sled", "ground" },
+                                                      .at = { { 0, 0.5 } },
+                                                      .limit = { .constant = 3 },
+                                                      .limit_sliding = { .constant = 1 } });
+  pw_add_friction (m, &(pw_friction){ .name = "hold",
+                                      .body = { "sled", "ground" },
+                                      .limit = { .constant = 1 },
+                                      .limit_sliding = { .constant = 0.2 } });
+}
+
+TEST (sticking_beside_sliding) {
+  pw_system *s = scene_system (&moreau_two_frictions_table, NULL);
+  pw_run *r = runs_open (s, "moreau", &(pw_settings){ .step = 1e-3, .span = 1 });
+  const pw_sample x = runs_to (r, 1);
+  check_close ("angle", x.q[2], 0, 1e-14, "it sticks");
+  check_close ("velocity", x.v[0], 1, 1e-12, "2 - 1 t");
+  runs_close (r, s);
+}
+
 static double moreau_bounce;
 
 /* A rod falls flat on two stops; below it three balls in a row. */

@@ -698,6 +698,42 @@ TEST (wheels_of_a_car) {
   }
 }
 
+/* A ball, pushed by 1 N, bounces from a block of 4 kg.  After an impact with the velocity u the block slides by
+ * 0.0169 u^2 and stops before the next one, whose velocity is sqrt (0.04^2 + 2 * 0.0169) u. */
+SCENE (events_shunt) {
+  const char *const name[] = { "block", "ball" };
+  for (int i = 0; i < 2; i++) {
+    pw_add_body (m, &(pw_body){ .name = name[i], .mass = i ? 1 : 4, .inertia = 1, .start = { i ? -0.5 : 0 } });
+    pw_add_slider (m, &(pw_slider){ .name = i ? "B" : "A", .body = { name[i], "ground" } });
+  }
+  pw_add_force (m, &(pw_force){ .name = "push", .body = "ball", .fx = { .constant = 1 } });
+  pw_add_sliding_friction (
+      m, &(pw_sliding_friction){ .name = "rub", .body = { "block", "ground" }, .limit = { .constant = 8 } });
+  pw_add_end_stop (
+      m,
+      &(pw_end_stop){
+          .name = "hit", .body = { "ball", "block" }, .what = PW_DRIVE_X, .specified = { 0, 1 }, .restitution = 0.3 });
+}
+
+/* Its impacts accumulate although friction holds between them. */
+TEST (accumulation_with_friction) {
+  char method[40];
+  const double end = 0.26 * 0.26 / 4 / (1 - 0.04 * 0.04 - 0.26 * 0.26 / 2);
+  for (int i = 0; runs_method (i, method); i++) {
+    const pw_method *m = runs_method (i, method);
+    if (m->locates_no_events) continue;
+    pw_system *s = scene_system (&events_shunt_table, NULL);
+    pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-9, .span = 2, .ledger = 1 });
+    const pw_sample x = runs_to (r, 2);
+    int count;
+    (void)pw_run_events (r, &count);
+    assert_in_range (count, 10, 60);
+    for (int k = 0; k < 2; k++) check_close (method, x.q[3 * k], end, 2e-6, "the method's error");
+    check_close (method, x.loss, 0.5 + end, 2e-6, "the work of the push");
+    runs_close (r, s);
+  }
+}
+
 SCENE (events_driven) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1, .rate = { 1 } });
   pw_add_slider (m, &(pw_slider){ .name = "rail", .body = { "cart", "ground" } });
