@@ -27,6 +27,7 @@ campaign () {
 
 campaign 'the reference against closed forms' closed_forms.py
 campaign 'random mechanisms by every method' compare.py --seed "${SEED:-1}" --count "${COUNT:-300}"
+campaign 'mechanisms with limits' compare_limited.py --seed "${SEED:-1}" --count $((${COUNT:-300} / 20))
 campaign 'transformed mechanisms' metamorphic.py --seed "${SEED:-1}" --count $((${COUNT:-300} / 3))
 campaign 'stated errors' stated.py --seed "${SEED:-1}" --count $((${COUNT:-300} / 3))
 exit $bad

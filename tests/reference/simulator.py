@@ -42,11 +42,12 @@ class State:
     """One state of a mechanism: frames of its bodies, constraints and forces of its elements.
 
     rows: constraints (name, Rate that is zero, g or None); f: applied forces by coordinate; work, loss: powers by
-    element [W]; potential [J]; driven: (name, row, rate that a signal prescribes)."""
+    element [W]; potential [J]; driven: (name, row, rate that a signal prescribes); limited: equations that hold only
+    within limits, which events.py decides on."""
 
     def __init__(self, m, t, middle, q, v):
         self.m, self.t, self.middle = m, t, middle
-        unit = m.unit
+        self.v, unit = v, m.unit
         self.coordinate = [Jet(q[i], v[i], 0.0, unit[i]) for i in range(m.n)]
         zero = np.zeros(m.n)
         self.frame = {"ground": Frame(Jet(0j, 0j, 0j, zero), Jet(0.0, 0.0, 0.0, zero))}
@@ -56,7 +57,7 @@ class State:
                                          unit[i] + 1j * unit[i + 1]),
                                      self.coordinate[i + 2])
         self.states = m.named(q, v) if m.reads_states else None
-        self.rows, self.f = [], np.zeros(m.n)
+        self.rows, self.limited, self.f = [], [], np.zeros(m.n)
         self.work, self.loss, self.potential = {}, {}, 0.0
         self.driven = []
         for kind, name, e in m.elements:
@@ -76,6 +77,24 @@ class State:
         """Adds the holonomic constraint g = 0."""
         self.rows.append((name, g.rate(), g.x))
 
+    def limit(self, e, field):
+        """The value of a limit, or None."""
+        s = self.m.signals.get((id(e), field))
+        return s.at(self.t, self.middle, self.states).x * self.m.factor(e[field]) if s else None
+
+    def hold(self, name, e, field, *rates):
+        """Constrains rates: up to a limit of their multipliers, if there is one."""
+        most = self.limit(e, field)
+        if most is None:
+            self.rows += [(name[:-1] + part, r, None) for part, r in zip("NT", rates)]
+        else:
+            sliding = self.limit(e, field + "_sliding")
+            self.limited.append(Limited(name, rates, most=most, sliding=most if sliding is None else sliding))
+
+    def one_sided(self, name, rate, gap, restitution=0, angular=False):
+        """rate >= 0 where gap = 0; its multiplier is >= 0."""
+        self.limited.append(Limited(name, [rate], gap=gap, restitution=restitution, angular=angular))
+
     def apply(self, effort, rate):
         """Adds a force or moment whose power is effort times rate."""
         self.f += effort * rate.g
@@ -83,6 +102,18 @@ class State:
     def apply_at(self, F, P):
         """Adds a force, as a vector, at a point."""
         self.f += (F.conjugate() * P.g).real
+
+
+class Limited:
+    """Rates that are 0 while their multipliers mu are within limits.
+
+    Friction of one rate, or of two, a vector: |mu| <= most; sliding: |mu| where the rates are not 0.  One-sided, with a
+    gap (NaN: of a rate only): rate >= 0 where gap <= 0, mu >= 0.  Friction of a contact: `normal` is its one-sided
+    equation, most and sliding are factors of that multiplier."""
+
+    def __init__(self, name, rates, most=None, sliding=None, gap=None, restitution=0, normal=None, angular=False):
+        self.name, self.rates, self.most, self.sliding, self.normal = name, rates, most, sliding, normal
+        self.gap, self.restitution, self.angular = gap, restitution, angular
 
 
 def pin(state, name, e):
@@ -143,13 +174,15 @@ def contact(state, e):
 
 
 def wheel(state, name, e):
-    state.rows.append((name + ".N", dot(heading(state, e) * 1j, contact(state, e).rate()), None))
+    state.hold(name + ".N", e, "grip", dot(heading(state, e) * 1j, contact(state, e).rate()))
 
 
 def rolling_wheel(state, name, e):
-    wheel(state, name, e)
     spin = state.coordinate[state.m.own[name]]
-    state.rows.append((name + ".T", dot(heading(state, e), contact(state, e).rate()) - spin.rate() * e["radius"], None))
+    h, velocity = heading(state, e), contact(state, e).rate()
+    state.hold(name + ".N", e, "grip", dot(h * 1j, velocity), dot(h, velocity) - spin.rate() * e["radius"])
+    if "brake" in e:
+        state.hold(name + ".B", e, "brake", spin.rate())
     u = state.signal(e, "torque").x
     state.apply(u, spin.rate())
     state.work[name] = u * spin.d
@@ -157,7 +190,47 @@ def rolling_wheel(state, name, e):
 
 def steered_wheel(state, name, e):
     h = state.frame[e["body"]].e * taylor.turn(state.signal(e, "heading"))
-    state.rows.append((name + ".N", dot(h * 1j, contact(state, e).rate()), None))
+    state.hold(name + ".N", e, "grip", dot(h * 1j, contact(state, e).rate()))
+
+
+def stop(state, name, e):
+    A, B = state.frames(e)
+    P, Q = state.points(e)
+    g = A.phi - B.phi if e["what"] == "angle" else dot(B.direction(0 if e["what"] == "x" else math.pi / 2), P - Q)
+    for side, gap in (("low", g - e.get("low", 0)), ("high", e.get("high", 0) - g)):
+        if side in e:
+            state.one_sided(name + "." + side, gap.rate(), gap.x, e.get("restitution", 0), e["what"] == "angle")
+
+
+def rope(state, name, e):
+    P, Q = state.points(e)
+    gap = e["length"] - taylor.sqrt(dot(P - Q, P - Q))
+    state.one_sided(name + ".F", gap.rate(), gap.x, e.get("restitution", 0))
+
+
+def freewheel(state, name, e):
+    A, B = state.frames(e)
+    state.one_sided(name + ".T", (A.phi - B.phi).rate(), math.nan, 0, True)
+
+
+def contact_of_bodies(state, name, e):
+    """A disc on a line, or on another disc; tangent h, normal h i, C: where they touch."""
+    A, B = state.frames(e)
+    P, Q = state.points(e)
+    r, other = e.get("radius", 0), e.get("other_radius", 0)
+    if other > 0:
+        d = taylor.sqrt(dot(P - Q, P - Q))
+        h, gap = (P - Q) / d * -1j, d - (r + other)
+    else:
+        h = B.direction(e.get("heading", 0))
+        gap = dot(h * 1j, P - Q) - r
+    state.one_sided(name + ".N", gap.rate(), gap.x, e.get("restitution", 0))
+    if e.get("mu", 0) > 0:
+        C = P - h * (1j * r)
+        sliding = dot(h, P.rate()) + A.phi.rate() * r - dot(h, Q.rate()) - taylor.product(dot(h, (C - Q) * 1j),
+                                                                                           B.phi.rate())
+        state.limited.append(Limited(name + ".T", [sliding], most=e["mu"], sliding=e.get("mu_sliding", e["mu"]),
+                                     normal=state.limited[-1]))
 
 
 def prescribed(state, name, rate, u):
@@ -216,22 +289,24 @@ def rotational_spring(state, name, e):
 
 
 def resist(state, name, e, w):
-    """Viscous and Coulomb friction against the rate w."""
+    """Viscous and Coulomb friction against the rate w; without a speed the latter is exact."""
     F = e.get("viscous", 0) * w.x
-    if e.get("limit", 0) > 0:
+    if "limit" in e and "speed" not in e:
+        state.hold(name, e, "limit", w)
+    elif e.get("limit", 0) > 0:
         F += e["limit"] * math.tanh(w.x / e["speed"])
     state.apply(-F, w)
-    state.loss[name] = F * w.x
+    state.loss[name[:-2]] = F * w.x
 
 
 def friction(state, name, e):
     A, B = state.frames(e)
-    resist(state, name, e, (A.phi - B.phi).rate())
+    resist(state, name + ".T", e, (A.phi - B.phi).rate())
 
 
 def sliding_friction(state, name, e):
     P, Q = state.points(e)
-    resist(state, name, e, dot(state.frames(e)[1].direction(e.get("heading", 0)), P - Q).rate())
+    resist(state, name + ".F", e, dot(state.frames(e)[1].direction(e.get("heading", 0)), P - Q).rate())
 
 
 def drag(state, name, e):
@@ -289,10 +364,13 @@ def marker(state, name, e):
 KINDS = {f.__name__.replace("_", "-"): f for f in (
     pin, weld, slider, slot, rod, gear, drive, wheel, rolling_wheel, steered_wheel, speed, pfaffian, tyre,
     rolling_resistance, spring, rotational_spring, friction, sliding_friction, drag, gravity, force, torque, motor,
-    marker)}
+    marker, stop, rope, freewheel)} | {"contact": contact_of_bodies}
 SIGNALS = {("drive", "value"), ("speed", "value"), ("pfaffian", "value"), ("torque", "value"),
            ("rolling-wheel", "torque"), ("force", "fx"), ("force", "fy"), ("motor", "angle"), ("motor", "rate"),
-           ("steered-wheel", "heading")}
+           ("steered-wheel", "heading"), ("rolling-wheel", "brake")} | {
+               (kind, field + end) for kind, field in (("wheel", "grip"), ("steered-wheel", "grip"), ("rolling-wheel", "grip"),
+                                                       ("friction", "limit"), ("sliding-friction", "limit"))
+               for end in ("", "_sliding")}
 
 
 class Mechanism:
@@ -321,7 +399,7 @@ class Mechanism:
         for kind, name, e in self.elements:
             for field, value in e.items():
                 if (kind, field) in SIGNALS:
-                    s = self.signals[id(e), field] = Signal(value)
+                    s = self.signals[id(e), field] = Signal(self.load(value))
                     self.reads_states = self.reads_states or s.states
         self.breaks = sorted({b for s in self.signals.values() for b in s.breaks})
         self.length = self._length()
@@ -341,6 +419,15 @@ class Mechanism:
             if b.get("mass", 0) > 0:
                 return math.sqrt(b.get("inertia", 0) / b["mass"]) or 1.0
         return 1.0
+
+    @staticmethod
+    def load(value):
+        """The signal of a field: of a limit with a friction coefficient, that of the load."""
+        return value["load"] if isinstance(value, dict) and "load" in value else value
+
+    @staticmethod
+    def factor(value):
+        return value["mu"] if isinstance(value, dict) and "load" in value else 1.0
 
     def start_angle(self, body):
         return 0.0 if body == "ground" else self.q[3 * self.bodies.index(body) + 2]

@@ -90,6 +90,11 @@ def dot(a, b):
     return real(Rate(n * b.x, m * b.x + n * b.d, n * b.g))
 
 
+def product(a, w):
+    """The product of a jet and a rate."""
+    return Rate(a.x * w.x, a.d * w.x + a.x * w.d, a.x * w.g)
+
+
 def turn(a):
     """exp (i a): the direction at the angle a."""
     e = cmath.exp(1j * a.x)
