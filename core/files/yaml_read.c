@@ -538,17 +538,6 @@ int pw_check_state_name (pw_reader *r, const pw_node *node, const char *name, si
                           name + n + 1);
 }
 
-int pw_is_velocity_name (const pw_reader *r, const char *name) {
-  const char *dot = strchr (name, '.'), *part = dot ? dot + 1 : "";
-  const char *owner = PW_PRINTED (100, "%.*s", dot ? (int)(dot - name) : 0, name);
-  if (dot == NULL) return 0;
-  if (pw_names_find (&r->bodies, owner) >= 0) return pw_body_state (part) >= 3;
-  const int kind = pw_names_find (&r->elements, owner);
-  for (int i = 0; kind >= 0 && i < pw_kinds[kind]->internal; i++)
-    if (strcmp (part, pw_kinds[kind]->coordinate[i].rate) == 0) return 1;
-  return 0;
-}
-
 int pw_build_name (pw_reader *r, const pw_node *node, const char *label, const char **name) {
   char part[PW_PATH];
   if (pw_count_entry (r, node) != PW_OK || pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;

@@ -155,8 +155,6 @@ extern const char *const pw_body_states[6];
 int pw_body_state (const char *part);
 /* Checks that a name with a dot, or that of a first-order state, at an offset of the expression, names a state. */
 int pw_check_state_name (pw_reader *r, const pw_node *node, const char *name, size_t at);
-/* Whether the name of a state is that of a velocity, not of a coordinate or a first-order state. */
-int pw_is_velocity_name (const pw_reader *r, const char *name);
 /* Reads the name of a body or element, which must be unique. */
 int pw_build_name (pw_reader *r, const pw_node *node, const char *label, const char **name);
 /* Reports an error of the core at a node, without its prefix "model NAME: ". */

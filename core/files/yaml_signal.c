@@ -103,6 +103,18 @@ static void signal_close (void *context) {
   free (context);
 }
 
+/* Whether the name of a state is that of a velocity, not of a coordinate or a first-order state. */
+static int signal_is_velocity (const pw_reader *r, const char *name) {
+  const char *dot = strchr (name, '.'), *part = dot ? dot + 1 : "";
+  const char *owner = PW_PRINTED (100, "%.*s", dot ? (int)(dot - name) : 0, name);
+  if (dot == NULL) return 0;
+  if (pw_names_find (&r->bodies, owner) >= 0) return pw_body_state (part) >= 3;
+  const int kind = pw_names_find (&r->elements, owner);
+  for (int i = 0; kind >= 0 && i < pw_kinds[kind]->internal; i++)
+    if (strcmp (part, pw_kinds[kind]->coordinate[i].rate) == 0) return 1;
+  return 0;
+}
+
 /* Adds a state, at an offset of the expression, unless it is known already. */
 static int signal_add_state (pw_reader *r, const pw_node *node, pw_signal_function *f, const char *name, size_t at) {
   for (int i = 1; i <= f->states; i++)
@@ -112,7 +124,7 @@ static int signal_add_state (pw_reader *r, const pw_node *node, pw_signal_functi
                             r->kind->of_coordinate ? "a curve depends on its parameter s"
                                                    : "the signal of a position constraint depends on the time t");
   if (pw_check_state_name (r, node, name, at) != PW_OK) return r->error->status;
-  if (f->derivatives && pw_is_velocity_name (r, name))
+  if (f->derivatives && signal_is_velocity (r, name))
     return expression_fail (r, node, at,
                             "\"%s\": the signal of a velocity constraint depends on positions and first-order states, "
                             "not on velocities; use a state that follows it, {name: NAME, rate: (%s - NAME)/TIME}",

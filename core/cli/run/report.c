@@ -84,8 +84,7 @@ int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *erro
   pw_error own = { 0 };
   pw_limit seconds = { .seconds = limit };
   const pw_settings settings = { .stop = pw_limit_over, .stop_context = &seconds };
-  pw_limit_start (&seconds);
-  pw_run *run = pw_run_open (m->system, "rk4+none", &settings, &own); /* makes no step: any method will do */
+  pw_run *run = pw_limit_open (m->system, "rk4+none", &settings, &own); /* makes no step: any method will do */
   if (run) report_initial (run, m->system);
   pw_run_close (run);
   return own.status == PW_RESOURCE ? pw_fail (error, own.status, "%s", own.text) : PW_OK;
