@@ -38,17 +38,12 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
   evaluate_rows (w, offsetof (pw_kind, gamma), w->s->constraints, gamma);
 }
 
-PW_SELDOM void evaluate_J_then_gamma (const pw_element_batch *k, double *gamma) {
-  k->kind->J (&k->b, k->J);
-  evaluate_batch_rows (k, k->kind->gamma, gamma);
-}
-
 void pw_evaluate_J_gamma (pw_workspace *w, double *gamma) {
   PW_EACH_CONSTRAINT (k, w)
     if (k->kind->J_gamma)
       k->kind->J_gamma (&k->b, k->J, gamma + k->row);
     else
-      evaluate_J_then_gamma (k, gamma);
+      k->kind->J (&k->b, k->J), evaluate_batch_rows (k, k->kind->gamma, gamma);
 }
 
 /* Calls f (..., bodies, internal) for a batch, with constants for the commonest numbers, so that its loops over the

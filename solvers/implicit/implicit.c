@@ -2,17 +2,13 @@
 #include <stdlib.h>
 #include "implicit.h"
 
-static pw_implicit *implicit_of (pw_run *r) {
-  return (pw_implicit *)r->data;
-}
-
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count) {
   x->memory = pw_alloc_arrays (array, count);
   return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
 }
 
 int pw_implicit_complete (pw_run *r, int status, int size, pw_dense_projection projection, pw_error *error) {
-  pw_implicit *x = implicit_of (r);
+  pw_implicit *x = (pw_implicit *)r->data;
   const pw_scatter_map *pattern = &x->dae.tangent.scatter;
   if (status == PW_OK) status = pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, pattern->colptr, pattern->rowind);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
@@ -21,7 +17,7 @@ int pw_implicit_complete (pw_run *r, int status, int size, pw_dense_projection p
 }
 
 void pw_implicit_close (pw_run *r) {
-  pw_implicit *x = implicit_of (r);
+  pw_implicit *x = (pw_implicit *)r->data;
   pw_dense_output_close (&x->last);
   pw_sparse_close (&x->sparse);
   pw_dae_close (&x->dae);
@@ -30,7 +26,7 @@ void pw_implicit_close (pw_run *r) {
 }
 
 int pw_implicit_restart (pw_run *r, pw_error *error) {
-  pw_implicit *x = implicit_of (r);
+  pw_implicit *x = (pw_implicit *)r->data;
   (void)error;
   r->counter = (pw_step_counter){ .base = r->t };
   x->last.start.t = r->t;
@@ -86,7 +82,7 @@ static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, do
 }
 
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error) {
-  pw_implicit *x = implicit_of (r);
+  pw_implicit *x = (pw_implicit *)r->data;
   int whole;
   const double end = pw_step_end (r, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
@@ -107,5 +103,5 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
 }
 
 int pw_implicit_at (pw_run *r, double t, pw_error *error) {
-  return pw_dense_output_at (&implicit_of (r)->last, r, t, error);
+  return pw_dense_output_at (&((pw_implicit *)r->data)->last, r, t, error);
 }

@@ -444,34 +444,24 @@ static int radau_restart (pw_run *r, pw_error *error) {
 
 static int radau_allocate (pw_run *r) {
   pw_method_data *d = r->data;
-  enum { SINGLE = 17, OF_STAGE = 6 };
   const size_t n = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
-  const size_t entries = (size_t)r->entries;
-  pw_array array[SINGLE + OF_STAGE * STAGES] = {
-    { &d->B, n },
-    { &d->unit, n },
-    { &d->tolerance, n },
-    { &d->newton_tolerance, n },
-    { &d->round_off, n },
-    { &d->row_factor, n },
-    { &d->column_factor, n },
-    { &d->Y, n },
-    { &d->a_end, n },
-    { &d->now.y, n },
-    { &d->last.y, n },
-    { &d->now.a, n },
-    { &d->last.a, n },
-    { &d->rate, entries },
-    { &d->now.ledger, entries },
-    { &d->last.ledger, entries },
-    { &d->complex_x, 2 * n },
-  };
-  for (int k = 0; k < STAGES; k++) {
-    const pw_array stage[OF_STAGE] = { { &d->now.Z[k], n },  { &d->now.ledger_change[k], entries },  { &d->W[k], n },
-                                       { &d->last.Z[k], n }, { &d->last.ledger_change[k], entries }, { &d->F[k], n } };
-    memcpy (array + SINGLE + OF_STAGE * k, stage, sizeof stage);
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &d->memory);) {
+    double **const unknowns[] = { &d->B,         &d->unit,       &d->tolerance,     &d->newton_tolerance,
+                                  &d->round_off, &d->row_factor, &d->column_factor, &d->Y,
+                                  &d->a_end,     &d->now.y,      &d->last.y,        &d->now.a,
+                                  &d->last.a };
+    for (size_t i = 0; i < sizeof unknowns / sizeof *unknowns; i++)
+      *unknowns[i] = pw_layout_alloc (&l, n, sizeof (double));
+    d->complex_x = pw_layout_alloc (&l, 2 * n, sizeof (double));
+    for (int k = 0; k < STAGES; k++) {
+      double **const stage[] = { &d->now.Z[k], &d->last.Z[k], &d->W[k], &d->F[k] };
+      for (int i = 0; i < 4; i++) *stage[i] = pw_layout_alloc (&l, n, sizeof (double));
+      d->now.ledger_change[k] = pw_layout_alloc (&l, (size_t)r->entries, sizeof (double));
+      d->last.ledger_change[k] = pw_layout_alloc (&l, (size_t)r->entries, sizeof (double));
+    }
+    double **const ledger[] = { &d->rate, &d->now.ledger, &d->last.ledger };
+    for (int i = 0; i < 3; i++) *ledger[i] = pw_layout_alloc (&l, (size_t)r->entries, sizeof (double));
   }
-  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
