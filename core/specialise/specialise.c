@@ -380,12 +380,6 @@ static signed char sparsity_of_value (double value) {
   return value == 0 ? TERM_ZERO : value == 1 ? TERM_ONE : value == -1 ? -TERM_ONE : TERM_CONSTANT;
 }
 
-static int sparsity_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
-  for (int n = 0; n < k->kind->bodies; n++)
-    if (k->column[e * k->kind->bodies + n] >= s->coords) return 1;
-  return 0;
-}
-
 /* Merges the entries of element e at one state into `out`.  first: its entries of J at the scene's first state, stored
  * if is_first; known: 1 if `out` has entries already. */
 static void sparsity_state (const pw_element_batch *k, int e, int is_first, int known, double *first, sparsity *out) {
@@ -415,7 +409,9 @@ static int sparsity_scene (const pw_system *s, pw_random *random, int *known, sp
     pw_evaluate_J (w);
     if (k->kind->force) k->kind->force (&k->b, k->block);
     for (int e = 0; e < k->b.count; e++) {
-      if (sparsity_is_grounded (s, k, e)) continue;
+      int is_grounded = 0;
+      for (int n = 0; n < k->kind->bodies; n++) is_grounded |= k->column[e * k->kind->bodies + n] >= s->coords;
+      if (is_grounded) continue;
       sparsity_state (k, e, state == 0, *known, first[e], out);
       *known = 1;
     }

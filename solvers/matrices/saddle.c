@@ -825,19 +825,6 @@ static void condense_add_pair (saddle_plan *plan, int a, int b) {
   if (!plan->failed) plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs++ + 1] = b;
 }
 
-/* Lists the pairs of nodes that meet at a group, or, if that is an uncondensed body, each of them with its nodes. */
-static void condense_pairs (saddle_plan *plan) {
-  for (int g = 0; g < plan->groups; g++) {
-    int body = plan->uncondensed[g];
-    for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
-      int a = plan->contribution[plan->list[x]].node;
-      if (body >= 0) condense_add_pair (plan, a, body), condense_add_pair (plan, a, body + 1);
-      for (int y = plan->start[g]; y < x && body < 0; y++)
-        condense_add_pair (plan, a, plan->contribution[plan->list[y]].node);
-    }
-  }
-}
-
 /* Sorts the contributions of each group by column; by insertion, since there are few. */
 static void condense_sort_columns (const saddle_plan *plan, const int *column_of_node) {
   for (int g = 0; g < plan->groups; g++) {
@@ -980,7 +967,13 @@ static int condense_dense (const saddle_plan *plan) {
 }
 
 static int condense_block (saddle_plan *plan) {
-  condense_pairs (plan);
+  for (int g = 0; g < plan->groups; g++) /* nodes that meet at a group; at an uncondensed body each with its nodes */
+    for (int x = plan->start[g], body = plan->uncondensed[g]; x < plan->start[g + 1]; x++) {
+      int a = plan->contribution[plan->list[x]].node;
+      if (body >= 0) condense_add_pair (plan, a, body), condense_add_pair (plan, a, body + 1);
+      for (int y = plan->start[g]; y < x && body < 0; y++)
+        condense_add_pair (plan, a, plan->contribution[plan->list[y]].node);
+    }
   if (plan->failed || plan->pairs >= INT_MAX / 2) return PW_RESOURCE;
   pw_block_ldl *l = plan->saddle->block = pw_block_open (plan->nodes, plan->node, plan->pairs, plan->pair);
   if (l == NULL) return PW_RESOURCE;
