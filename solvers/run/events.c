@@ -615,7 +615,7 @@ static void impulses_list (pw_run *r, double h, const double *g) {
     }
     x->d.b[x->d.n] = x->u[i] + (x->rests[i] ? 0 : x->limit[i].restitution * x->u_before[i]);
     /* friction that slides has its sliding limit from the beginning: others need not balance the larger one */
-    const int slides = one_sided ? 0 : x->mode[i];
+    const int slides = one_sided || fabs (before) <= PW_MODES_SMALL ? 0 : x->mode[i];
     const double lo = slides < 0 ? x->limit[i].sliding[0] : x->limit[i].least;
     const double hi = slides > 0 ? x->limit[i].sliding[1] : x->limit[i].most;
     pw_modes_add (x, i, h * (lo - x->mean[i]), h * (hi - x->mean[i]), x->mode[i]);
