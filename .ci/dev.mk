@@ -14,7 +14,7 @@ help::
 	@echo 'make bench-engine     the time of an evaluation and a step, compared with programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions per evaluation with one further effect at a time; unused element types cost none'
 	@echo 'make hard             every method on every hard case, against the expected verdicts; writes docs/hard-cases.md and .csv'
-	@echo 'make layers           checks the dependencies between directories; words: the terms in names and text'
+	@echo 'make layers           checks the dependencies between directories, and that every mutant applies; words: the terms in names and text'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: compiles everything, warnings are errors'
 	@echo 'make fuzz TIME=60     fuzzes models, expressions, tables, checkpoints and command lines, TIME seconds each'
 	@echo 'make mutants TIME=7200   changes the sources in one place at a time; lists changes that no test detects; resumes'

@@ -2,6 +2,7 @@
 """Mutation testing: applies one mutation at a time to a copy of the sources, builds, runs tests and lists the survivors.
 
     run.py [--time SECONDS] [--only WORD] [--named] BUILD
+    run.py --apply
 
 The file `list` beside this one has a line for each mutation:
 
@@ -51,8 +52,8 @@ def definitions(text):
         if start is not None and (re.match(r"}(?!.*{$)", line.rstrip()) or ("{" in line and "}" in line and text.startswith(line, start))):
             yield text[start:end].split("{")[0], start, end
             start = None
-        elif start is not None and macro is None and "{" not in text[start:end] and line.rstrip().endswith(";"):
-            start = None
+        elif start is not None and macro is None and "{" not in text[start:end] and re.search(r";$|^$", line.rstrip()):
+            start = None  # a declaration, or a macro that defines functions
         position = end
 
 
@@ -160,9 +161,8 @@ def main():
     options.add_argument("--only", default="", help="mutations whose line contains this")
     options.add_argument("--named", action="store_true", help="only the tests named in the list; survivors are not noted")
     options.add_argument("--apply", action="store_true", help="only check that every mutation applies")
-    options.add_argument("build")
+    options.add_argument("build", nargs="?", default="build/variant/mutants")
     options = options.parse_args()
-    os.makedirs(options.build, exist_ok=True)
     mutations = list(read_list(os.path.join(HERE, "list")))
     names = sources()
     files = {n: open(os.path.join(TOP, n)).read() for n in names if n == "Makefile" or n.startswith(ROOTS) and n.endswith((".c", ".h"))}
@@ -176,6 +176,7 @@ def main():
         print(f"{len(mutations)} mutations, {wrong} do not apply")
         return 1 if wrong else 0
 
+    os.makedirs(options.build, exist_ok=True)
     path, verdicts = os.path.join(options.build, "results"), {}
     if os.path.exists(path):
         for line in open(path):
