@@ -44,6 +44,19 @@ TEST (pendulum) {
   pw_linear_free (&l);
 }
 
+/* Two rows at an angle have the singular values sqrt (1 +- cos). */
+SCENE (linear_oblique) {
+  pw_add_body (m, &(pw_body){ .name = "block", .mass = 1, .inertia = 1 });
+  for (int i = 0; i < 2; i++)
+    pw_add_speed (m, &(pw_speed){ .name = i ? "oblique" : "along", .body = "block", .heading = 0.6 * i });
+}
+
+TEST (least) {
+  pw_linear l = linear_of (&linear_oblique_table);
+  check_close ("least", l.least, sqrt (1 - cos (0.6)), 16 * CHECK_EPS, "two rows");
+  pw_linear_free (&l);
+}
+
 SCENE (linear_oscillator) {
   pw_add_body (m, &(pw_body){ .name = "block", .mass = 1.5, .inertia = 0.1, .start = { 0.8 } });
   pw_add_spring (

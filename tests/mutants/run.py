@@ -166,9 +166,12 @@ def main():
     mutations = list(read_list(os.path.join(HERE, "list")))
     names = sources()
     files = {n: open(os.path.join(TOP, n)).read() for n in names if n == "Makefile" or n.startswith(ROOTS) and n.endswith((".c", ".h"))}
-    wrong = 0
+    tests, wrong = {os.path.basename(n) for n in names if n.startswith("tests/")}, 0
     for m in mutations:
         m["applied"], why = apply(m, files)
+        unknown = [t for t in m["tests"] if not {t, t + ".c"} & tests]
+        if unknown:
+            m["applied"], why = None, f"there is no test {unknown[0]}"
         if m["applied"] is None:
             print(f"tests/mutants/list:{m['line']}: {m['text']}: does not apply: {why}")
             wrong += 1

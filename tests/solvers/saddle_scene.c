@@ -56,7 +56,7 @@ static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
   free (q);
 }
 
-/* Solves with and without forces; multipliers of inactive rows are 0. */
+/* Solves with and without forces, after the factorisation and together with it; multipliers of inactive rows are 0. */
 static double saddle_solve (trial *x) {
   const pw_system *s = x->run->s;
   size_t coords = (size_t)s->coords + 3, rows = (size_t)s->rows;
@@ -72,6 +72,8 @@ static double saddle_solve (trial *x) {
     for (int i = 0; i < s->rows; i++) gamma[i] = saddle_number (&x->random), lambda[i] = 0;
     assert_int_equal (pw_saddle_factor (k), PW_OK);
     pw_saddle_solve (k, force, gamma, a, lambda);
+    worst = fmax (worst, saddle_error (x, force, gamma, a, lambda));
+    assert_int_equal (pw_saddle_factor_solve (k, force, gamma, a, lambda), PW_OK);
     worst = fmax (worst, saddle_error (x, force, gamma, a, lambda));
   }
   pw_saddle_close (k);
