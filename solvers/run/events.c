@@ -26,6 +26,10 @@
 #define EVENTS_STRAIGHT 40 /* bends by which a function increases in a step that surely has one root at most */
 #define EVENTS_PARTED 1e-9 /* u [units] of an equation that no longer depends on those that hold: more than round-off */
 enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
+/* Most decisions in sequence that change no mode, each within EVENTS_IDLE_TIME [T] of the one before: u does not
+ * leave 0, and round-off decides on its sign. */
+enum { EVENTS_IDLE = 1000 };
+#define EVENTS_IDLE_TIME 1e-4
 
 static int events_allocate (pw_run *r) {
   const pw_system *s = r->s;
@@ -203,6 +207,21 @@ static int events_leave (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
+/* PW_METHOD if decisions go on that change nothing; known: events before the last one. */
+static int events_check_idle (pw_run *r, long known, pw_error *error) {
+  pw_events *x = r->events;
+  int i = 0;
+  x->idle = r->event_count == known && r->t - x->decided_t < EVENTS_IDLE_TIME * r->w->scale.time ? x->idle + 1 : 0;
+  x->decided_t = r->t;
+  if (x->idle < EVENTS_IDLE) return PW_OK;
+  while (i < x->count - 1 && x->mode[i] == 0) i++;
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: whether %s slides is decided by round-off, in ever more decisions that change nothing; use "
+      "another step or an adaptive method",
+      r->t, PW_NAME (pw_system_row_name, r->s, x->row[i]));
+}
+
 static int events_prepare (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   int status = PW_OK;
@@ -219,7 +238,9 @@ static int events_prepare (pw_run *r, pw_error *error) {
       x->previous_t = NAN, x->longest = EVENTS_FIRST * r->w->scale.time, x->roughness = 0;
       memset (x->armed, 0, (size_t)x->count);
       status = events_project (r, error);
+      const long known = r->event_count;
       if (status == PW_OK) status = pw_modes_decide (r, 0, error);
+      if (status == PW_OK) status = events_check_idle (r, known, error);
       r->watchdog.largest_sine = 0;
       if (status == PW_OK) status = pw_run_renew (r, error);
       if (status == PW_OK) pw_run_set_reference_level (r);

@@ -37,14 +37,16 @@ typedef struct pw_events {
   double *u, *u_before, *impulse;
   const unsigned char *origin;      /* of initial values: of the run; NULL in a restart */
   double *direction, *bias, *reach; /* d, e and e0 of circles */
-  double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
-  int at_end;     /* 1: the state reached, its multipliers and its J are known */
-  int samples;    /* 1: J has been evaluated elsewhere since */
-  int pending;    /* 1: modes must be decided at the state reached */
-  int fell;       /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
-  int stepping;   /* 1: events are not located; impulses of whole steps are decided (moreau) */
-  int jumped;     /* 1: there was an impact in the last step */
-  double *mean;   /* multipliers of the last step: its impulses over its length */
+  double *offset;   /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
+  int at_end;       /* 1: the state reached, its multipliers and its J are known */
+  int samples;      /* 1: J has been evaluated elsewhere since */
+  int idle;         /* decisions in sequence that changed no mode; */
+  double decided_t; /* the time of the last one */
+  int pending;      /* 1: modes must be decided at the state reached */
+  int fell;         /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
+  int stepping;     /* 1: events are not located; impulses of whole steps are decided (moreau) */
+  int jumped;       /* 1: there was an impact in the last step */
+  double *mean;     /* multipliers of the last step: its impulses over its length */
 
   pw_decision d;                  /* of the last decision; D: by their number among those with limits */
   double *f, *a, *gamma, *lambda; /* coords + 3; the same; rows; 2 rows */

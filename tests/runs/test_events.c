@@ -773,6 +773,26 @@ TEST (dependent) {
   pw_system_free (s);
 }
 
+/* Where a velocity stays at round-off, decisions do not go on without end: the run stops, or keeps the position. */
+TEST (velocity_at_round_off) {
+  static const char *const method[] = { "erk8+projection", "rk4+projection", "galpha+ggl" };
+  pw_system *s = runs_scene ("hardly", "");
+  double x = 0;
+  for (int i = 0; i < 3; i++) {
+    pw_error error = { 0 };
+    pw_sample sample;
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .span = 1 });
+    const int status = pw_run_advance_to (r, 0.3, 1, &error);
+    check_ok (pw_run_sample (r, pw_run_time (r), &sample, &(pw_error){ 0 }), NULL);
+    if (i == 0) x = sample.q[0];
+    check_close (method[i], sample.q[0], x, 1e-6, "it hardly moves");
+    if (i == 0) check_ok (status, &error);
+    if (status != PW_OK) assert_non_null (strstr (error.text, "rolling-wheel e1 slides is decided by round-off"));
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 TEST (no_code) {
   pw_error error = { 0 };
   pw_system *s = runs_scene ("sleigh", "");
