@@ -121,8 +121,8 @@ typedef struct {
 typedef struct {
   const char *text; /* as given; NULL: it is not */
   double number;
-} pw_given;
-static inline double pw_given_or (pw_given x, double otherwise) {
+} pw_cli_given;
+static inline double pw_cli_given_or (pw_cli_given x, double otherwise) {
   return x.text ? x.number : otherwise;
 }
 
@@ -134,7 +134,7 @@ typedef struct {
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char **method_files;
   const char *method, *specialise, *width, *until;
-  pw_given max_file, t_end, step, rtol, atol, max_steps, limit, jobs;
+  pw_cli_given max_file, t_end, step, rtol, atol, max_steps, limit, jobs;
   const char *table, *json, *plots; /* -o, --json, --plots of PW_RESULTS_OPTIONS */
   pw_cli_model m;                   /* opened by pw_cli_open */
   pw_files files;                   /* opened by pw_files_open */
@@ -161,7 +161,7 @@ typedef struct {
 #define PW_COMMAND(name) extern const pw_command pw_cli_##name;
 PW_COMMANDS (PW_COMMAND)
 
-/* Entries of a table of options: a text, a number of a domain (a pw_given), a list of texts (the option may be
+/* Entries of a table of options: a text, a number of a domain (a pw_cli_given), a list of texts (the option may be
  * repeated), a flag (an int).  The member of the structure `type` is zero if the option is not given; texts are
  * released with the command line.  `name`: "every"; `letter`: 'e', or 0 without a short form; `value`: its name in the
  * help, "DT". */

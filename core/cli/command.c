@@ -130,7 +130,7 @@ static int command_read (const pw_command *command, const pw_command *const *all
   line->argument = poptGetArgs (line->popt);
   while (line->argument && line->argument[line->arguments]) line->arguments++;
   for (const struct poptOption *o = command->options; !command_is_end (o); o++) {
-    pw_given *x = (pw_given *)(void *)((char *)line + (size_t)o->arg);
+    pw_cli_given *x = (pw_cli_given *)(void *)((char *)line + (size_t)o->arg);
     const char *option = PW_PRINTED (40, "--%s", o->longName ? o->longName : "");
     if (o->val && pw_cli_number (option, x->text, (pw_domain)(o->val - 1), &x->number, error) != PW_OK)
       return error->status;
@@ -280,15 +280,16 @@ double pw_axis_value (const pw_axis *axis, long i) {
 
 void pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings,
                       pw_limit *limit) {
-  *limit = (pw_limit){ .seconds = pw_given_or (line->limit, INFINITY) };
-  *settings = (pw_settings){ .span = pw_given_or (line->t_end, defaults->t_end),
-                             .step = pw_given_or (line->step, defaults->step),
-                             .rtol = pw_given_or (line->rtol, defaults->rtol),
-                             .atol = line->atol.number,
-                             .max_steps = (long)pw_given_or (line->max_steps, PW_MAX_STEPS), /* PW_COUNT: at most 1e9 */
-                             .stop = pw_limit_over,
-                             .stop_context = limit,
-                             .methods = line->methods };
+  *limit = (pw_limit){ .seconds = pw_cli_given_or (line->limit, INFINITY) };
+  *settings =
+      (pw_settings){ .span = pw_cli_given_or (line->t_end, defaults->t_end),
+                     .step = pw_cli_given_or (line->step, defaults->step),
+                     .rtol = pw_cli_given_or (line->rtol, defaults->rtol),
+                     .atol = line->atol.number,
+                     .max_steps = (long)pw_cli_given_or (line->max_steps, PW_MAX_STEPS), /* PW_COUNT: at most 1e9 */
+                     .stop = pw_limit_over,
+                     .stop_context = limit,
+                     .methods = line->methods };
 }
 
 int pw_cli_incomplete (const pw_cli_line *line, pw_error *error) {
@@ -434,7 +435,7 @@ static int cli_method_files (pw_cli_line *line, pw_error *error) {
 
 int pw_cli_file (pw_cli_line *line, pw_error *error) {
   const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
-  const double size = pw_given_or (line->max_file, PW_FILE_DEFAULT_BYTES >> 20);
+  const double size = pw_cli_given_or (line->max_file, PW_FILE_DEFAULT_BYTES >> 20);
   if (size < 1e-3) return pw_fail (error, PW_INPUT, "--max-file %s: expected at least 0.001 MB", line->max_file.text);
   if (size > largest)
     return pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file.text, largest);

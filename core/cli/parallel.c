@@ -17,7 +17,7 @@ int pw_parallel_jobs (const pw_cli_line *line) {
   cpu_set_t set; /* the processors that this process may use */
   if (wanted <= 0 && sched_getaffinity (0, sizeof set, &set) == 0) wanted = CPU_COUNT (&set);
   if (wanted <= 0) wanted = sysconf (_SC_NPROCESSORS_ONLN);
-  return (int)fmin (pw_given_or (line->jobs, wanted > 0 ? (double)wanted : 1), PARALLEL_JOBS);
+  return (int)fmin (pw_cli_given_or (line->jobs, wanted > 0 ? (double)wanted : 1), PARALLEL_JOBS);
 }
 
 /* For timed tasks (below): cores to which threads are bound. */

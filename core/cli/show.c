@@ -441,7 +441,7 @@ static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
 typedef struct {
   pw_cli_line line;
   int matrices, yaml, code; /* 1: shown in place of the description of the model */
-  pw_given at;              /* time at which matrices are shown [s] */
+  pw_cli_given at;          /* time at which matrices are shown [s] */
 } show_line;
 
 static int show_command (void *options, pw_error *error) {

@@ -740,7 +740,7 @@ SCENE (events_driven) {
   pw_add_drive (m, &(pw_drive){ .name = "D",
                                 .body = { "cart", "ground" },
                                 .what = PW_DRIVE_X,
-                                .value = { PW_HARMONIC, .harmonic = { 1, 1, -PW_PI / 2 } } });
+                                .value = { PW_HARMONIC, .harmonic = { 1, 1, -PW_PI / 2, 0 } } });
   pw_add_end_stop (m, &(pw_end_stop){ .name = "S", .body = { "cart", "ground" }, .what = PW_DRIVE_X, .high = 0.5 });
 }
 

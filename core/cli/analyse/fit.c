@@ -20,7 +20,7 @@ typedef enum { FIT_ALONG, FIT_EVENT, FIT_NUMBER } fit_kind;
 typedef struct {
   pw_cli_line line;
   const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *time_name;
-  pw_given confidence_given, starts_given, time_scale, time_offset;
+  pw_cli_given confidence_given, starts_given, time_scale, time_offset;
   const char **free, **sigma_texts;
   pw_unknowns unknowns;
   double confidence; /* probability of confidence intervals */
@@ -199,7 +199,7 @@ static void data_report (const pw_fit *fit) {
 
 /* Converts times to seconds.  time: 1 for a column with times, of rows or events, or with their deviations. */
 static void data_convert_times (pw_fit *fit, double *table, const unsigned char *time, int columns) {
-  const double scale = pw_given_or (fit->time_scale, 1), offset = fit->time_offset.number;
+  const double scale = pw_cli_given_or (fit->time_scale, 1), offset = fit->time_offset.number;
   for (int i = 0; i < columns * fit->rows; i++) {
     const int column = i / fit->rows;
     if (time[column]) table[i] = scale * (table[i] + (column > fit->columns ? 0 : offset / scale));
@@ -963,8 +963,8 @@ static int fit_draw (const pw_fit *fit, pw_error *error) {
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
 
 static int fit_options (pw_fit *fit, pw_error *error) {
-  const double starts = pw_given_or (fit->starts_given, 1);
-  fit->confidence = pw_given_or (fit->confidence_given, 0.95);
+  const double starts = pw_cli_given_or (fit->starts_given, 1);
+  fit->confidence = pw_cli_given_or (fit->confidence_given, 0.95);
   fit->starts = (int)starts, fit->jobs = pw_parallel_jobs (&fit->line);
   if (fit->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
   if (fit->columns_text == NULL)

@@ -7,7 +7,7 @@
 
 typedef struct {
   pw_cli_line line;
-  pw_given at;
+  pw_cli_given at;
   const char *name, *json_path;             /* of -o and --json, or NULL */
   const char *page_path;                    /* of --animate, or NULL */
   const char **hold_texts;                  /* of --hold */

@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
   pw_cli_line line;
   const char *maximise, *minimise, *path, *json_path, *plots_path;
-  pw_given starts_given, seed_given;
+  pw_cli_given starts_given, seed_given;
   const char **free, **subject_to;
   pw_unknowns unknowns;
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
@@ -691,8 +691,8 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
-  const double starts = pw_given_or (problem->starts_given, 10);
-  problem->least = INFINITY, problem->seed = pw_given_or (problem->seed_given, 1);
+  const double starts = pw_cli_given_or (problem->starts_given, 10);
+  problem->least = INFINITY, problem->seed = pw_cli_given_or (problem->seed_given, 1);
   problem->starts = (int)starts, problem->jobs = pw_parallel_jobs (&problem->line);
   if (!problem->maximise == !problem->minimise)
     return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");

@@ -15,7 +15,7 @@ enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each from the state af
 typedef struct {
   pw_cli_line line;
   const char *period_text, *vary_text;
-  pw_given periods, guess;
+  pw_cli_given periods, guess;
   pw_limit limit;
   pw_periodic_settings settings;
   const char *source; /* of the period: "of the signals", "--period", "found" */
@@ -37,7 +37,7 @@ static const int periodic_settling[] = { 0, 10, 100 };
 _Static_assert(sizeof periodic_settling / sizeof *periodic_settling == PW_PERIODIC_ATTEMPTS, "one for each attempt");
 
 static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
-  const double periods = pw_given_or (cmd->periods, 1);
+  const double periods = pw_cli_given_or (cmd->periods, 1);
   cmd->settings.free = cmd->period_text && strcmp (cmd->period_text, "free") == 0;
   cmd->source = cmd->settings.free ? "found" : cmd->period_text ? "--period" : "of the signals";
   if (cmd->guess.text && !cmd->settings.free)

@@ -18,7 +18,7 @@ typedef struct {
   pw_cli_line line;
   const char **by; /* of --by, ended by NULL */
   const char **of; /* of --of, ended by NULL */
-  pw_given every;
+  pw_cli_given every;
   pw_unknowns unknowns;   /* P of them */
   pw_run_outputs outputs; /* method NULL: the run itself; set by sensitivity_prepare for the runs that are compared */
   int jobs;               /* threads */

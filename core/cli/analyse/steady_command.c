@@ -19,7 +19,7 @@ enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */
 typedef struct {
   pw_cli_line line;
   const char **hold_texts, *vary_text;
-  pw_given starts_given, at;
+  pw_cli_given starts_given, at;
   pw_limit limit;
   pw_steady_settings settings;
   pw_initial_value hold[PW_HOLDS]; /* settings.holds values */
@@ -65,9 +65,9 @@ static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
 }
 
 static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
-  const double starts = pw_given_or (cmd->starts_given, STEADY_STARTS);
+  const double starts = pw_cli_given_or (cmd->starts_given, STEADY_STARTS);
   cmd->settings.t = cmd->at.number;
-  cmd->limit.seconds = pw_given_or (cmd->line.limit, INFINITY);
+  cmd->limit.seconds = pw_cli_given_or (cmd->line.limit, INFINITY);
   cmd->settings.span = cmd->line.m.defaults.t_end;
   cmd->settings.vary = -1; /* none of the values held */
   cmd->settings.hold = cmd->hold;

@@ -32,7 +32,7 @@ typedef struct {
   int table;     /* 1: --table */
   int concludes; /* 1: a conclusion is printed, since errors of coordinates are known */
   const char *rtol_text, *step_text;
-  pw_given repeats_given;
+  pw_cli_given repeats_given;
   double finest_step; /* of --step-ladder [s] */
   double repeats;     /* timed runs of a row, at most */
   pw_reference reference;
@@ -601,9 +601,9 @@ static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], 
 static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
-  study->settings.span = pw_given_or (study->line.t_end, study->line.m.defaults.t_end);
-  study->cpu_limit = pw_given_or (study->line.limit, 10);
-  compare->repeats = pw_given_or (compare->repeats_given, 9);
+  study->settings.span = pw_cli_given_or (study->line.t_end, study->line.m.defaults.t_end);
+  study->cpu_limit = pw_cli_given_or (study->line.limit, 10);
+  compare->repeats = pw_cli_given_or (compare->repeats_given, 9);
   if (compare->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", compare->repeats_given.text, COMPARE_REPEATS);
   int status = pw_study_read_methods (study, compare_default_methods, error);

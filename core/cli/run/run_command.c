@@ -15,7 +15,7 @@
 typedef struct {
   /* as given, or NULL; without --checkpoint, `path` is that of --resume */
   const char *path, *resume_path;
-  pw_given interval_given;
+  pw_cli_given interval_given;
   /* as understood */
   double interval;       /* simulated time between two checkpoints [s]; 0: there are none */
   double next_time;      /* of the next checkpoint [s]; INFINITY: never */
@@ -58,7 +58,7 @@ enum { PW_RUN_TABLE, PW_RUN_PAGE, PW_RUN_SUMMARY, PW_RUN_OUTPUTS };
 typedef struct pw_run_cli {
   /* as given */
   pw_cli_line line;
-  pw_given every;
+  pw_cli_given every;
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
   const char **of;               /* ended by NULL; or NULL */
   int with_energies, with_error; /* 1: --energy, --error */
@@ -539,7 +539,7 @@ static int checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_
     if (interval) checkpoints->interval = fmax (strtod (interval, NULL), 0);
     if (*specialise == PW_SPECIALISE_AUTO) *specialise = engine ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
   }
-  checkpoints->interval = pw_given_or (checkpoints->interval_given, checkpoints->interval);
+  checkpoints->interval = pw_cli_given_or (checkpoints->interval_given, checkpoints->interval);
   return PW_OK;
 }
 
