@@ -83,6 +83,8 @@ void pw_progress_at (pw_progress *p, double reached);
 /* Erases the bar. */
 void pw_progress_end (pw_progress *p);
 
+/* ---- Commands and their options ---- */
+
 /* All commands, in the order of `pinwheel --help`. */
 #define PW_COMMANDS(X) \
   X (list)             \
@@ -281,6 +283,8 @@ int pw_cli_adaptive (const pw_method *const *own, const char *method);
  * that compare methods. */
 void pw_cli_report_unused (const char *method, const pw_cli_line *line);
 
+/* ---- Models ---- */
+
 /* Opens the model file of a command line, whose first argument is its name or path.  A status. */
 int pw_cli_file (pw_cli_line *line, pw_error *error);
 
@@ -348,6 +352,8 @@ void pw_cli_engine_close (pw_cli_engine *e);
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);
 
+/* ---- Files ---- */
+
 /* First entry of the list of files passed to pw_cli_check_uses, which fills in the path. */
 #define PW_CLI_MODEL_USE \
   { "the model", NULL, PW_READS, NULL }
@@ -379,6 +385,8 @@ int pw_cli_names_file (const char *path);
 int pw_cli_check_format (const pw_use *use, pw_error *error);
 /* Endings of formats, for pw_use. */
 extern const char *const pw_cli_csv[], *const pw_cli_json[], *const pw_cli_tables[];
+
+/* ---- Messages ---- */
 
 /* A number as text (pw_format), in a buffer that lives as long as the block around it. */
 #define PW_DIGITS(value, digits) pw_format ((char[32]){ 0 }, value, digits)

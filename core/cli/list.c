@@ -236,6 +236,8 @@ static int list_overview (pw_error *error) {
   return PW_OK;
 }
 
+/* ---- The command `list` ---- */
+
 static int list_command (void *options, pw_error *error) {
   static const struct {
     const char *name;

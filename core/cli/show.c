@@ -246,6 +246,8 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   return PW_OK;
 }
 
+/* ---- The description ---- */
+
 enum { SHOW_DIGITS = 6 };
 
 static void show_bodies (const pw_system *s) {
@@ -437,6 +439,8 @@ static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
   pw_run_close (run);
   return status;
 }
+
+/* ---- The command ---- */
 
 typedef struct {
   pw_cli_line line;

@@ -82,6 +82,8 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
   return (pw_partials){ .x = sqrt (1 - m * s * s), .xx = -m * s * c };
 }
 
+/* ---- List of functions and constants ---- */
+
 /* The entries are pw_expression_function. */
 #define FUNCTION_OF_ONE(name, f, trend, from, to) \
   { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to, 0, 0 }
@@ -128,6 +130,8 @@ int pw_expression_find_function (const char *name) {
   return -1;
 }
 
+/* ---- Functions of paths ---- */
+
 const char *const pw_path_functions[] = { "s", "x", "y", "heading", "curvature", "offset", NULL };
 
 /* A function of a place: value, first and second derivative by the arc length, which the offset does not have. */
@@ -173,6 +177,8 @@ static pw_partials path_partials (int function, const pw_path_place *p, const do
   return (pw_partials){ t * C - n * S, t * S + n * C, tt * C * C - 2 * nt * S * C, tt * S * C + nt * (C * C - S * S),
                         tt * S * S + 2 * nt * S * C };
 }
+
+/* ---- Values ---- */
 
 static inline pw_order value_order (double a, double b) {
   return a < b ? PW_ORDER_LESS : a > b ? PW_ORDER_GREATER : a == b ? PW_ORDER_EQUAL : PW_ORDER_UNORDERED;
@@ -385,6 +391,8 @@ int pw_expression_sides (const pw_expression *x, const double *variable, double 
   if (fixed) fixed->codes = n;
   return conditions;
 }
+
+/* ---- Derivatives of expressions ---- */
 
 typedef struct {
   double v, d, dd; /* value, first and second derivative with respect to the variable */

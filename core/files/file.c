@@ -511,6 +511,8 @@ int pw_output_finish (pw_output *o, pw_error *error) {
   return pw_output_finish_all (&o, 1, error);
 }
 
+/* ---- Continuation of an interrupted run ---- */
+
 enum { OUTPUT_CHECKED = 65536 }; /* bytes */
 /* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter or
  * cannot be read. */
@@ -589,6 +591,8 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
   output_free (o);
   return NULL;
 }
+
+/* ---- Checkpoints ---- */
 
 static unsigned long long checkpoint_sum (const char *head, size_t head_size, const void *state, size_t state_size) {
   return pw_check_sum (pw_check_sum (PW_CHECK, head, head_size), state, state_size);

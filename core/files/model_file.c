@@ -170,6 +170,8 @@ static void search_close (search *s) {
   free (s->found);
 }
 
+/* ---- Compilers, which run without a shell ---- */
+
 extern char **environ;
 
 typedef struct {
@@ -328,6 +330,8 @@ static int build_file (const char *path, const char *engine, build_user *use, vo
   pthread_sigmask (SIG_SETMASK, &cmd.mask, NULL);
   return status;
 }
+
+/* ---- Models ---- */
 
 struct pw_file {
   char name[PW_PATH], path[PW_PATH]; /* the name without its ending; the path with links resolved */
@@ -622,6 +626,8 @@ void pw_page_close (pw_page *p) {
   }
   free (p->file);
 }
+
+/* ---- Specialised scenes ---- */
 
 int pw_processor_lanes (void) {
 #if defined __x86_64__

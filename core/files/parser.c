@@ -589,6 +589,8 @@ void pw_formula_close (pw_formula *f) {
   free (f);
 }
 
+/* ---- Conditions ---- */
+
 struct pw_condition {
   pw_arena arena;
   const pw_expression *expression;

@@ -61,6 +61,8 @@ static int read_reference (pw_reader *r) {
   return pw_yaml_entries (r, r->y->reference, reference_entry);
 }
 
+/* ---- Places of included files ---- */
+
 /* A frame in the plane. */
 typedef struct pw_place {
   double at[2], phi; /* [m], [rad] */
@@ -195,6 +197,8 @@ static int build_body (pw_reader *r, const pw_node *node) {
   pw_names_add (&r->bodies, body.name, bodies);
   return pw_add_body (r->model, &body);
 }
+
+/* ---- Elements ---- */
 
 static int build_body_name (const pw_reader *r, const pw_node *node, const char **name) {
   if (pw_yaml_text (r, node, r->label, name) != PW_OK) return r->error->status;
@@ -404,6 +408,8 @@ static int build_state (pw_reader *r, const pw_node *node) {
   return text ? build_fields (r, name, name, text, node->first) : read_no_memory (r);
 }
 
+/* ---- The head ---- */
+
 /* A default must not depend on other parameters: --set would have to change it, too. */
 static int head_default (const pw_reader *r, const pw_node *node, const char *label, const pw_names *names,
                          pw_parameter *p) {
@@ -520,6 +526,8 @@ static int read_head (pw_yaml *y, const pw_reader *r) {
   pw_names_close (&names);
   return r->error->status;
 }
+
+/* ---- The model ---- */
 
 static int build_let (pw_reader *r, const pw_node *map) {
   const char *name;

@@ -589,6 +589,8 @@ int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal) {
   return pw_yaml_number (r, node, r->label, PW_REAL, &signal->constant);
 }
 
+/* ---- Paths ---- */
+
 static void path_free (void *path) {
   pw_path_close (path);
 }
@@ -657,6 +659,8 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
   r->reference->paths++;
   return pw_yaml_name_path (r, r->scope, r->prefix, text->name, path);
 }
+
+/* ---- Outlines of bodies ---- */
 
 enum { OUTLINE_MAX_BYTES = 16 << 20 };
 
@@ -729,6 +733,8 @@ int pw_yaml_outline (pw_reader *r, const pw_node *node, pw_body *body) {
   body->outline = (const double (*)[2])corner, body->corners = p.count;
   return PW_OK;
 }
+
+/* ---- Outputs ---- */
 
 int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit) {
   const char *at;

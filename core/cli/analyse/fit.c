@@ -420,6 +420,8 @@ static double solve_start (const pw_unknown *unknown, double value) {
   return isfinite (unknown->low) ? sqrt ((1 + part) * (1 + part) - 1) : value / unknown->scale;
 }
 
+/* ---- The search: residuals, minimum, errors of the estimates ---- */
+
 /* Ends the fit if memory is short, after Ctrl-C, or if what failed is `essential`: no search can do without it. */
 static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
   if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
@@ -691,6 +693,8 @@ static int fit_solve (pw_fit *fit, pw_error *error) {
   return solver.status;
 }
 
+/* ---- Reports: text, files, the figure ---- */
+
 enum {
   REPORT_DIGITS = 7,
   REPORT_CORRELATIONS = 9, /* unknowns whose correlations fit in a line, at most */
@@ -957,6 +961,8 @@ static int fit_draw (const pw_fit *fit, pw_error *error) {
   }
   return pw_curves_draw (&c, PW_OK, error);
 }
+
+/* ---- The command ---- */
 
 #define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 

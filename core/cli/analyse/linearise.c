@@ -425,6 +425,8 @@ static int linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *e
   return error->status;
 }
 
+/* ---- The command ---- */
+
 /* Indices in the list of files of linearise_open_files; 0 is the model. */
 enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
 

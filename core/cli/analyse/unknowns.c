@@ -276,7 +276,7 @@ pw_system *pw_vary_compile (void *vary, double value, pw_error *error) {
   return m.system;
 }
 
-/* States in options and reports of `linearise`, `steady` and `periodic`. */
+/* ---- States in options and reports of `linearise`, `steady` and `periodic` ---- */
 
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error) {

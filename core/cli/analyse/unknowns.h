@@ -1,5 +1,5 @@
 /* Unknowns: parameters and initial values that analyses and searches vary, and runs with given values of them.  An
- * array x has a value for each unknown.  States in options and reports of analyses. */
+ * array x has a value for each unknown.  Also states in options and reports of analyses. */
 #ifndef PW_UNKNOWNS_H_
 #define PW_UNKNOWNS_H_
 #include <math.h>
@@ -118,7 +118,7 @@ void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double val
  * the pw_vary. */
 pw_system *pw_vary_compile (void *vary, double value, pw_error *error);
 
-/* States in options and reports of `linearise`, `steady` and `periodic`. */
+/* ---- States in options and reports of `linearise`, `steady` and `periodic` ---- */
 
 enum { PW_HOLDS = 40 }; /* quantities held at given values (pw_system_find_held), at most */
 

@@ -479,6 +479,8 @@ static int data_points (const pw_plots *plots, int ground, pw_error *error) {
   return pw_output_finish (o, error);
 }
 
+/* ---- Scripts of paths and mechanism ---- */
+
 static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
   const int mechanism = strcmp (name, "mechanism") == 0;
   pw_output *o = pw_figure_begin (&plots->figures, name, error);
@@ -513,6 +515,8 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
     pw_figure_text (f, PW_PRINTED (30, "body[%d]", b + 1), pw_plot_name (plots, &plots->bodies, b));
   return pw_figure_end (o, name, error);
 }
+
+/* ---- Curves over time ---- */
 
 int pw_plot_marked (const pw_plots *plots, int row, int *end) {
   const int rows = pw_system_rows (plots->system);

@@ -588,6 +588,8 @@ static void report_write (const pw_check *check, pw_json *j) {
   if (j == NULL) report_lists (j, check);
 }
 
+/* ---- The command ---- */
+
 static int check_model (pw_check *check, pw_error *error) {
   const pw_system *s = check->line.m.system;
   const pw_run_defaults *defaults = &check->line.m.defaults;

@@ -535,6 +535,8 @@ static void conclusion_print (const pw_compare *compare) {
   if (before != beginning) putchar ('\n');
 }
 
+/* ---- The rows ---- */
+
 enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
 #define COMPARE_FEW 3          /* timed runs of a row that suffice if their times agree or are long */
 #define COMPARE_FEWEST 2       /* those that suffice if their times agree and are long */
@@ -613,6 +615,8 @@ static int compare_plan (pw_study *study, pw_error *error) {
   compare->finest_step = ladders[0].to;
   return status == PW_OK ? compare_plan_rows (study, ladders, error) : status;
 }
+
+/* ---- A row ---- */
 
 /* Errors below the uncertainty of the reference are replaced by it, and marked. */
 static void compare_set_errors (const pw_compare *compare, const pw_motion *motion, pw_row *row) {
@@ -719,6 +723,8 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   if (row->state == ROW_DONE) memcpy (row->point, point, sizeof point);
   return status;
 }
+
+/* ---- The command ---- */
 
 static int compare_begin (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;

@@ -96,6 +96,8 @@ static double run_end_time (const pw_run_cli *command) {
   return command->outcomes.ended ? command->outcomes.t : pw_run_time (command->run);
 }
 
+/* ---- The comparison with a reference solution ---- */
+
 /* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution
  * unless --start changes the initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
 static int comparison_open (pw_comparison *comparison, const pw_cli_line *line, const char *path, double t_end,
@@ -145,6 +147,8 @@ static const pw_reference_error *comparison_errors (pw_comparison *comparison, c
   errors->reactions = error[MOTION_MULTIPLIERS];
   return errors;
 }
+
+/* ---- The repetition of --error, and the errors that follow from it ---- */
 
 enum { ERROR_BODIES = 20, ERROR_COLUMNS = 24, ERROR_WIDTH = 12, ERROR_DIGITS = 2 };
 
@@ -274,6 +278,8 @@ static void report_stated (const pw_run_cli *command, FILE *f) {
   error_bodies (e, command->line.m.system, f);
   error_columns (e, command->line.m.system, command->with_energies, f);
 }
+
+/* ---- Warnings and results ---- */
 
 enum {
   REPORT_ROWS = 24,   /* reactions, or internal coordinates, that are printed at most */
@@ -666,6 +672,8 @@ static int checkpoints_save (pw_run_cli *command, pw_error *error) {
   return status;
 }
 
+/* ---- Before the run ---- */
+
 /* Refuses files used twice.  Called before the model is open, and again after that, for the tables that it reads. */
 static int run_check_paths (pw_run_cli *command, pw_error *error) {
   const pw_checkpoints *checkpoints = &command->checkpoints;
@@ -782,6 +790,8 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   status = error_start (command, error);
   return status == PW_OK ? checkpoints_resume (command, error) : status;
 }
+
+/* ---- The run ---- */
 
 /* The time of the next row [s]: a multiple of the interval, or the end if the two differ by round-off only; 0 if every
  * step has a row; INFINITY without a table. */
@@ -909,6 +919,8 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   if (status == PW_STOPPED) status = pw_limit_status (&command->limit, pw_run_time (command->run), error);
   return status;
 }
+
+/* ---- After the run ---- */
 
 /* Writes the table to the disk for run_name_files, or keeps its rows as NAME.part; without rows it leaves no file. */
 static void run_close_table (pw_run_cli *command, int complete, pw_error *error) {
