@@ -33,7 +33,7 @@ int pw_stop_release (void);
 typedef struct {
   double seconds; /* INFINITY: no limit */
   /* private */
-  double start;      /* the thread's clock at the start [s] */
+  double start;      /* the thread's clock at the start [s]; 0: not started */
   double last_check; /* the coarse clock when the limit was last found not exceeded [s] */
 } pw_limit;
 
@@ -44,8 +44,8 @@ int pw_limit_over (void *context);
 /* Why a run returned PW_STOPPED at time t: PW_RETRY, without an error, if pw_stop is set (after a signal the command
  * returns PW_INTERRUPTED); else PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
-/* Starts the clock, if there is one, and opens a run whose settings.stop is pw_limit_over, or NULL.  If the run is
- * stopped then, the error is that of pw_limit_status, without a text if that is PW_RETRY. */
+/* Opens a run whose settings.stop is pw_limit_over, or NULL, and starts the clock of its limit unless it runs already.
+ * If the run is stopped meanwhile, the error is that of pw_limit_status, without a text if that is PW_RETRY. */
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* The time of a clock [s]. */

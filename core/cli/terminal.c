@@ -317,7 +317,7 @@ int pw_limit_over (void *context) {
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
   pw_limit *limit = settings->stop_context;
   pw_error own = { 0 };
-  if (limit) pw_limit_start (limit);
+  if (limit && limit->start == 0) pw_limit_start (limit);
   pw_run *r = pw_run_open (s, method, settings, &own);
   if (own.status == PW_STOPPED && pw_stop)
     own = (pw_error){ .status = PW_RETRY };
