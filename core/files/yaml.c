@@ -675,6 +675,13 @@ static void build_model (pw_model *m, const void *parameters) {
   free (r.definition);
 }
 
+void pw_yaml_close (pw_yaml *y) {
+  if (y == NULL) return;
+  pw_arena_free (&y->arena);
+  free (y->source);
+  free (y);
+}
+
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
   pw_yaml *y = calloc (1, sizeof *y);
   if (y == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;

@@ -1,8 +1,8 @@
 /* Text models: interface between the files that read them.
  *
- *   yaml_text.c    reads the text; messages with line, column and caret; units of parameters; the tree as bytes
+ *   yaml_text.c    reads a text; messages with line, column and caret; units of parameters; the tree as bytes
  *   yaml_tree.c    builds a tree of scalars, lists and maps from libfyaml's events
- *   yaml_include.c included files
+ *   yaml_include.c reads a model and the files that it includes
  *   yaml_read.c, yaml_signal.c, yaml.c read a model from the tree (yaml_read.h) */
 #ifndef PW_YAML_H
 #define PW_YAML_H
@@ -63,11 +63,6 @@ int pw_yaml_find (const pw_yaml *y, size_t at, const char *name, char path[PW_PA
  * until it returns non-zero; returns that, or 0. */
 typedef int pw_yaml_each (void *context, const char *path);
 int pw_yaml_tables (const pw_yaml *y, int with_included, pw_yaml_each *each, void *context);
-/* The first unit that is no SI unit in a text, and its place; NULL: there is none. */
-const pw_unit_name *pw_yaml_other_unit (const char *unit, const char **at);
-/* Refuses the unit of a parameter, a scalar, if it contains another unit than an SI unit, and says how to convert the
- * value. */
-int pw_yaml_check_unit (const pw_yaml *y, const pw_node *unit, const pw_node *value, pw_error *error);
 
 /* ---- yaml_text.c and yaml_tree.c ---- */
 
@@ -80,6 +75,11 @@ int pw_yaml_no_memory (const pw_yaml *y, pw_error *error);
 const char *pw_yaml_part (const pw_yaml *y, size_t at, char path[PW_PATH]);
 /* The line of an offset, from 1. */
 int pw_yaml_line (const pw_yaml *y, size_t at);
+/* The first unit that is no SI unit in a text, and its place; NULL: there is none. */
+const pw_unit_name *pw_yaml_other_unit (const char *unit, const char **at);
+/* Refuses the unit of a parameter, a scalar, if it contains one that is no SI unit, and says how to convert the
+ * value. */
+int pw_yaml_check_unit (const pw_yaml *y, const pw_node *unit, const pw_node *value, pw_error *error);
 /* Checks the source from y->begin on, and stores its tree. */
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 /* Writes the tree as bytes, for programs without libfyaml; loads it.  PW_INPUT if it is incomplete; PW_RESOURCE. */

@@ -103,13 +103,6 @@ int pw_yaml_read_files (pw_yaml *y, const char *path, const char *shown, size_t 
   return status == PW_OK ? include_all (y, y->root, &(level){ NULL, path, 1 }, max_bytes, error) : status;
 }
 
-void pw_yaml_close (pw_yaml *y) {
-  if (y == NULL) return;
-  pw_arena_free (&y->arena);
-  free (y->source);
-  free (y);
-}
-
 /* Calls `each` with the path of every table named below a node. */
 static int files_tables (const pw_yaml *y, const pw_node *node, pw_yaml_each *each, void *context) {
   char path[PW_PATH], part[PW_PATH];

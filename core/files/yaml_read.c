@@ -194,7 +194,7 @@ int pw_node_is (const pw_node *node, const char *text) {
   return node->type == PW_YAML_SCALAR && strcmp (node->text, text) == 0;
 }
 
-/* A hint for a key, which is none of these, that end with NULL, nor like one; or "". */
+/* A hint for a text in place of one of these keys, which end with NULL; or "". */
 static const char *key_hint (const char *text, const char *const *key) {
   for (int i = 0; key[i]; i++) {
     size_t n = strlen (key[i]);

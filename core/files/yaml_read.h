@@ -142,8 +142,9 @@ int pw_count_entry (pw_reader *r, const pw_node *node);
 int pw_yaml_entries (pw_reader *r, const pw_node *list, read_entry *each);
 /* The node of an expression with the names as they are in the model. */
 int pw_yaml_rename (pw_reader *r, const pw_node *node, pw_node *renamed);
-/* A text with the counter of copies, or NULL, as a number, the prefix of an included file before the names of its
- * states and outputs, and its other names as numbers.  NULL if out of memory. */
+/* A text in which the counter of copies, unless they are NULL, is replaced by its value; and, unless the prefix of an
+ * included file is "", names of its states and outputs get the prefix, and its other names are replaced by their
+ * values.  NULL if out of memory. */
 const char *pw_yaml_renamed (const pw_reader *r, const struct pw_copies *copies, const char *prefix, const char *text);
 /* Reads an expression; `variable`: names, which end with NULL. */
 int pw_yaml_expression (pw_reader *r, const pw_node *node, const char *const *variable, const char **text,
