@@ -130,10 +130,10 @@ static int command_read (const pw_command *command, const pw_command *const *all
   line->argument = poptGetArgs (line->popt);
   while (line->argument && line->argument[line->arguments]) line->arguments++;
   for (const struct poptOption *o = command->options; !command_is_end (o); o++) {
+    if (o->val == 0) continue; /* no number: PW_NUMBER_OPTION */
     pw_cli_given *x = (pw_cli_given *)(void *)((char *)line + (size_t)o->arg);
-    const char *option = PW_PRINTED (40, "--%s", o->longName ? o->longName : "");
-    if (o->val && pw_cli_number (option, x->text, (pw_domain)(o->val - 1), &x->number, error) != PW_OK)
-      return error->status;
+    const char *option = PW_PRINTED (40, "--%s", o->longName);
+    if (pw_cli_number (option, x->text, (pw_domain)(o->val - 1), &x->number, error) != PW_OK) return error->status;
   }
   if (command->any_arguments) return PW_OK;
   if (line->arguments == 0)

@@ -215,7 +215,7 @@ static int elimination_next_pair (const elimination *ldl, const double *mass, in
   long least = -1;
   for (int j = 0; j < ldl->coordinates; j++) {
     double most = 0;
-    if (mass[j] > 0 || ldl->step[j] != ldl->n) continue;
+    if (mass[j] != 0 || ldl->step[j] != ldl->n) continue;
     for (int i = ldl->coordinates; i < ldl->n; i++)
       if (elimination_couples (ldl, i, j)) most = fmax (most, fabs (AT (i, j).value));
     for (int i = ldl->coordinates; i < ldl->n; i++) { /* no other entry may be much larger at the initial state */

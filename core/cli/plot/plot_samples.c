@@ -161,6 +161,7 @@ static void plot_disc_centre (const pw_plots *plots, int i, const pw_plot_disc *
   out[2] = placement[2];
 }
 
+/* Extends a box by the discs of the ground, or by those of bodies at sample i. */
 static void box_extend_discs (plot_box *box, const pw_plots *plots, int i, int ground) {
   for (const pw_plot_disc *disc = plots->disc; disc < plots->disc + plots->discs; disc++) {
     double at[3], r = disc->at[2];

@@ -171,10 +171,10 @@ static int check_limits (pw_check *check, pw_error *error) {
     const int first = CHECK_LIMIT_OUTPUTS * i;
     const pw_bounds *bounds = pw_system_limits (s, l->row);
     l->first = pw_outcome_value (&set, first + 2), l->events = pw_outcome_value (&set, first + 3);
-    for (int side = 0; side < 2 && !bounds->circle;
-         side++) { /* reactions are -lambda; on a circle one is only a part */
+    if (bounds->circle) continue; /* a reaction is only a part of what is limited */
+    for (int side = 0; side < 2; side++) {
       const pw_functional *f = &set.functional[set.outcome[first + side].term[0]];
-      const double most = side ? bounds->most : bounds->least, used = -f->value / most;
+      const double most = side ? bounds->most : bounds->least, used = -f->value / most; /* reactions are -lambda */
       if (isfinite (most) && most != 0 && !(used <= l->used)) l->used = used, l->t = f->t;
     }
   }

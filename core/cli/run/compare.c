@@ -663,8 +663,8 @@ static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *er
     sum += cpu[n++] = row->cpu;
     gsl_sort (cpu, 1, (size_t)n);
     const int agree = cpu[n - 1] - cpu[0] <= COMPARE_QUIET * cpu[0], is_long = sum > COMPARE_ENOUGH;
-    if (compare->repeats_given.text) continue;
-    if ((n >= COMPARE_FEW && (agree || is_long)) || (n >= COMPARE_FEWEST && agree && is_long)) break;
+    const int enough = (n >= COMPARE_FEW && (agree || is_long)) || (n >= COMPARE_FEWEST && agree && is_long);
+    if (enough && compare->repeats_given.text == NULL) break;
   }
   row->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
   row->value[COLUMN_REPEATS] = n;

@@ -11,8 +11,10 @@ int pw_motion_open (pw_motion *motion, const pw_system *system, const pw_motion 
   *motion = (pw_motion){ .t = calloc ((size_t)times * (size_t)(1 + width), sizeof *motion->t) };
   if (motion->t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   motion->times = times, motion->width = width, motion->value = motion->t + times;
-  pw_equal_times (t_end, times, motion->t);
-  if (at) memcpy (motion->t, at->t, (size_t)times * sizeof *motion->t);
+  if (at)
+    memcpy (motion->t, at->t, (size_t)times * sizeof *motion->t);
+  else
+    pw_equal_times (t_end, times, motion->t);
   return PW_OK;
 }
 

@@ -272,12 +272,14 @@ int pw_study_close_figure (pw_study *study, pw_curves *c, pw_error *error) {
 
 static int study_open_folder (pw_study *study, pw_error *error) {
   const char *const *tables = study->type->table_names;
-  const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
+  const char *names[FIGURE_ENDINGS + 3] = { NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->table_path, PW_WRITES, pw_cli_csv },
                    { "--plots", study->folder, PW_WRITES_INTO, names } };
   double width;
+  memcpy (names, pw_figure_endings, FIGURE_ENDINGS * sizeof *names);
+  names[FIGURE_ENDINGS] = tables[0], names[FIGURE_ENDINGS + 1] = tables[1];
   if (study->table_path && !pw_cli_names_file (study->table_path) && study->folder == NULL) {
     pw_cli_say ("pinwheel: -o %s: an old spelling of --plots %s\n", study->table_path, study->table_path);
     use[3].path = study->folder = study->table_path, use[2].path = study->table_path = NULL;
@@ -289,8 +291,8 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   study->csv = study->table_path ? study->line.files.output[2] : pw_figure_open_file (study->folder, tables[0], error);
   study->line.files.output[2] = NULL;
   if (study->csv == NULL) return error->status;
-  pw_text heading = { .chars =
-                          NULL }; /* rows follow as they finish, in NAME.part, which remains if the study is stopped */
+  /* Rows follow as they finish, in NAME.part, which remains if the study is stopped. */
+  pw_text heading = { .chars = NULL };
   for (const pw_study_column *c = study->type->column; c < study->type->column + study->type->columns; c++)
     if (c->name) pw_text_name (&heading, c->name, c->unit);
   pw_text_cell (&heading, "reason");
