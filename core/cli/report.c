@@ -1,4 +1,4 @@
-/* Messages before a run, on standard error. */
+/* Messages on a model and its initialisation, before a run, and the end of printed lists. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
