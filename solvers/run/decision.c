@@ -156,11 +156,13 @@ int pw_decision_pivot (pw_decision *d, int skips) {
       continue;
     }
     const double size = decision_size (d);
-    for (int k = 0; k < n && (worst < 0 || pass < 10 * n); k++) {
+    for (int k = 0; k < n && (worst < 0 || pass < 10 * n || pass == last); k++) {
       const double violation = d->blocked[k] ? 0 : decision_violation (d, k, size, &next);
       if (violation > most) most = violation, worst = k, to = next;
     }
-    if (worst < 0 || (pass == last && most <= DECISION_ROUND_OFF * size)) return PW_OK; /* round-off may be a cycle */
+    if (worst < 0) return PW_OK;
+    if (pass == last && most <= DECISION_ROUND_OFF * size) return PW_OK; /* modes that differ by round-off alternate */
+
     if (to != 0) memset (d->blocked, 0, (size_t)n); /* fewer hold: others may be independent now */
     changed = worst, before = d->trial[worst];
     d->trial[worst] = (signed char)to;
