@@ -56,7 +56,7 @@ int pw_decision_solve (pw_decision *d, int skips) {
   double *K = d->factor, *y = K + m * m;
   decision_assemble (d, m, K, y);
   for (int i = 0; i < m; i++) { /* Gaussian elimination: without friction K is positive semidefinite */
-    if (!(fabs (K[i * m + i]) > DECISION_DEPENDENT * d->A[held[i] * n + held[i]])) {
+    if (!(fabs (K[i * m + i]) > PW_DECISION_DEPENDENT * d->A[held[i] * n + held[i]])) {
       if (!skips && d->normal[held[i]] < 0) return PW_RETRY;
       d->redundant[held[i]] = 1, y[i] = 0;
       for (int k = 0; k < m; k++) K[i * m + k] = K[k * m + i] = k == i;
@@ -113,7 +113,7 @@ static double decision_violation (const pw_decision *d, int k, double size, int 
   if (d->trial[k] == 0) return unit * fmax (d->x[k] - hi, lo - d->x[k]);
   *to = 0;
   /* nearly dependent equations have z of this size whichever of them hold */
-  return -d->trial[k] * pw_decision_z (d, k) / unit - 2 * DECISION_DEPENDENT * size;
+  return -d->trial[k] * pw_decision_z (d, k) / unit - 2 * PW_DECISION_DEPENDENT * size;
 }
 
 /* Sets the given multipliers, except those of friction, which pw_decision_solve sets. */

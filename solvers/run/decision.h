@@ -4,7 +4,7 @@
 #include <math.h>
 #include "pinwheel.h"
 
-#define DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
+#define PW_DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
 
 /* n equations; arrays of that length, unless said otherwise.  z = b - A x are their accelerations or, in impacts,
  * velocities; x are their multipliers or impulses, less the known part of these if there is one.  An equation that

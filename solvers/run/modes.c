@@ -220,7 +220,7 @@ void pw_modes_matrix (pw_run *r, pw_saddle *saddle) {
     pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
     pw_mul_J (r->w, x->a, Ja);
     for (int i = 0; i < n; i++) A[i * n + k] = Ja[x->row[x->d.list[i]]];
-    x->d.redundant[k] = !(A[k * n + k] > DECISION_DEPENDENT * alone);
+    x->d.redundant[k] = !(A[k * n + k] > PW_DECISION_DEPENDENT * alone);
   }
   for (int k = 0; k < n; k++)
     for (int i = 0; i < n && x->d.redundant[k]; i++) A[i * n + k] = A[k * n + i] = 0;
