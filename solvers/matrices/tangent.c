@@ -91,10 +91,12 @@ void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *pu
     int of_equations = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
     if ((of_equations || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
     if (pw_block_function (k->kind, block) == NULL) continue;
-    for (int n = 0; put->direction && n < k->b.count * k->b.cols; n++) { /* 0 for the ground */
-      const int j = pw_global (k, n / k->b.cols, n % k->b.cols);
-      x->direction[n] = j < w->s->coords ? put->direction[j] : 0;
-    }
+    double *to = x->direction;
+    for (int e = 0; put->direction && e < k->b.count; e++)
+      for (int c = 0; c < k->b.cols; c++) {
+        const int j = pw_global (k, e, c);
+        *to++ = j < w->s->coords ? put->direction[j] : 0; /* 0 for the ground */
+      }
     k->b.w = x->direction;
     k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
     if (!x->scatter.recording) pw_evaluate_block (w, k, block, x->block);
@@ -281,7 +283,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   put.col = to->lambda;
   pw_tangent_add_JT (x, &put);
   for (const pw_coupling *c = x->run->coupling; c < x->run->coupling + x->run->couplings; c++) {
-    int e; /* the multiplier of the row c->row is a multiple of that of c->on */
+    int e; /* the multiplier of row c->row is a multiple of that of row c->on */
     const double *J;
     const pw_element_batch *k = pw_find_row (w, c->row, &e, &J);
     for (int i = 0; i < k->b.cols; i++)
