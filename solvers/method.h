@@ -227,8 +227,9 @@ struct pw_run {
   pw_arena arena;          /* of redundant rows and specialised code */
 };
 
-/* Equations that are not enforced (events.h) have given multipliers.  Sets the multipliers that are multiples of
- * others. */
+/* Equations that are not enforced (events.h) have given multipliers.  These functions set and apply them. */
+
+/* Sets the multipliers that are multiples of others. */
 static inline void pw_couple (pw_run *r, const double *lambda) {
   for (const pw_coupling *c = r->coupling; c < r->coupling + r->couplings; c++)
     r->reaction[c->row] = -c->ratio * lambda[c->on];

@@ -175,8 +175,8 @@ const char *pw_domain_check (pw_domain domain, double value) {
   return "";
 }
 
-/* Streams into memory that report if any part of the text is missing: open_memstream of glibc 2.36 does not: out of
- * memory, it drops what is written, and the error indicator stays 0. */
+/* Streams into memory that report if any part of the text is missing.  open_memstream of glibc 2.36 does not: if memory
+ * is exhausted, it drops what is written, and the error indicator stays 0. */
 
 static ssize_t stream_write (void *cookie, const char *bytes, size_t count) {
   pw_stream *t = cookie;

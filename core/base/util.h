@@ -83,9 +83,9 @@ int pw_is_line (const char *text);
 void pw_text_sanitise (char *text);
 /* Prints into a buffer, which is returned; what does not fit is cut off. */
 char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3, 4);
-/* The first n characters of a text, in the same way. */
+/* The first n bytes of a text, in the same way. */
 char *pw_print_part (char *buffer, size_t size, const char *text, size_t n);
-/* Texts in sequence up to NULL, in the same way: without a format, and so ten times faster. */
+/* Joins texts, of which NULL is the last, in the same way; ten times faster, since there is no format. */
 char *pw_join (char *buffer, size_t size, const char *first, ...);
 /* pw_print into a buffer of its own, which lives as long as the block around it. */
 #define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)

@@ -398,7 +398,7 @@ static double compile_length (const compilation *job) {
   return L > 0 ? L : 1;
 }
 
-/* Users of angles, and constant forces. */
+/* What a workspace must evaluate: users of the angles of bodies without inertia, and constant forces. */
 static int compile_evaluated (const compilation *job) {
   pw_system *s = job->s;
   int needed = 0, element = 0;

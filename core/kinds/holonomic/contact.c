@@ -103,8 +103,8 @@ static int touch_make (const pw_contact *definition, int rubs, touch *element, p
   return PW_OK;
 }
 
-/* A path: what its turns add to the functions of a line.  The lines along its tangent and its normal in a state, and
- * multiples of them. */
+/* A path that turns adds terms to the functions of a line.  They consist of the lines along its tangent and its normal
+ * in a state, and of multiples of these. */
 typedef struct {
   const line_state *along, *across;
   double Je[6], Jn[6], ve, vn; /* of e and n: J, J v */

@@ -13,7 +13,7 @@ PREPARE (rope_prepare, pw_rope, rod) {
   return PW_OK;
 }
 
-/* Fields of both definitions; about: the length. */
+/* Fields of both definitions; what: the meaning of the length. */
 #define ROD_FIELDS(type, what)                                                                               \
   BODIES_FIELD (type), { PW_AT (type, at), PW_POINT,      .count = 2,                                        \
                          .unit = "m",      .required = 1, .about = "the end points in the bodies' frames" }, \
