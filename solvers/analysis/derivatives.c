@@ -295,8 +295,8 @@ static double difference_output_size (const difference *x, const difference_para
 }
 
 static void difference_improve (const difference *x, difference_parameter *p, int i) {
-  int best, coarsest = FINEST + 1, finest = LEAST - 1, has_failed = 0; /* decades of the largest step, without failed
-                                                                        * ones, and of the smallest */
+  /* decades of the largest step that could be run, and of the smallest one, even if it failed */
+  int best, coarsest = FINEST + 1, finest = LEAST - 1, has_failed = 0;
   const difference_estimate e = difference_best (x, p, i, &best);
   const double natural = fmax (fabs (x->d->x[p->parameter]), 1), size = difference_output_size (x, p, i);
   if (!isfinite (x->value[i])) return;

@@ -514,8 +514,9 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
 static int equations_multipliers (pw_periodic *x, const double *u, int *trivial) {
   int n = x->n, size = x->size, lwork = PERIODIC_WORK * size, k = 0;
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;
-  for (int shift = pw_steady_hidden_symmetries (x->steady); shift < x->symmetries + x->settings.free && k < size; k++) {
-    equations_shift (x, shift++);
+  const int first = pw_steady_hidden_symmetries (x->steady), shifts = x->symmetries + x->settings.free - first;
+  for (; k < shifts && k < size; k++) {
+    equations_shift (x, first + k);
     equations_coordinates (x, x->change, S + k * size);
   }
   *trivial = k;

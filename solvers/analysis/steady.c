@@ -73,8 +73,8 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
     double part = k / (double)SIGNAL_TIMES;
     at = period > 0 ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
                     : t + span * part * part;           /* denser at first */
-    if (k >
-        SIGNAL_TIMES) { /* the middle between the first two breakpoints after the last one, or the first one and end */
+    if (k > SIGNAL_TIMES) {
+      /* the middle between the first two breakpoints after the last one, or between the first one and the end */
       breakpoint = pw_next_breakpoint (r->w, 1, breakpoint);
       at = breakpoint < end ? breakpoint + (fmin (pw_next_breakpoint (r->w, 1, breakpoint), end) - breakpoint) / 2
                             : INFINITY;
@@ -545,8 +545,8 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
                       s->model, x->n, STEADY_MAX_COORDINATES);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK) status = steady_begin (x, error);
-  for (int j = 0; j < x->n && status == PW_OK && !may_change;
-       j++) { /* angles that nothing turns keep their velocities */
+  for (int j = 0; j < x->n && status == PW_OK && !may_change; j++) {
+    /* angles that nothing turns keep their velocities */
     int held = !pw_is_unturned (s, j);
     for (int i = 0; i < x->settings.holds; i++) held |= x->hold[i].state == x->n + j;
     if (!held) x->hold[x->settings.holds++] = (pw_initial_value){ .state = x->n + j, .value = x->start[x->n + j] };

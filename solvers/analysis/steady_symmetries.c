@@ -100,13 +100,14 @@ void pw_steady_displace (const pw_steady *x, const double *rates, double time, d
 static int symmetry_evaluate (pw_steady *x, double near, int number) {
   pw_run *r = x->system.run;
   pw_projector p;
-  const double far =
-      pow (3, number - SYMMETRY_NEAR); /* by which the whole is displaced along x and y; it turns by pi */
   pw_irregular_state (r, near, number, x->q, x->v);
-  memset (x->combined, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *x->combined);
-  for (int i = PW_RATE_X; i <= PW_RATE_TURN; i++)
-    x->combined[i] = (i == PW_RATE_TURN ? PW_PI : far) * pw_irregular (0.9 + number, 1 + i);
-  if (number >= SYMMETRY_NEAR) pw_steady_displace (x, x->combined, 1, x->q, x->v);
+  if (number >= SYMMETRY_NEAR) { /* displaces the whole by up to `far` along x and y, and turns it by up to pi */
+    const double far = pow (3, number - SYMMETRY_NEAR);
+    memset (x->combined, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *x->combined);
+    for (int i = PW_RATE_X; i <= PW_RATE_TURN; i++)
+      x->combined[i] = (i == PW_RATE_TURN ? PW_PI : far) * pw_irregular (0.9 + number, 1 + i);
+    pw_steady_displace (x, x->combined, 1, x->q, x->v);
+  }
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);

@@ -822,7 +822,9 @@ static int condense_uncondensed (saddle_plan *plan) {
 
 static void condense_add_pair (saddle_plan *plan, int a, int b) {
   plan->failed |= pw_grow (&plan->pair, (size_t)plan->pairs, &plan->pair_room, 2 * sizeof *plan->pair) != PW_OK;
-  if (!plan->failed) plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs++ + 1] = b;
+  if (plan->failed) return;
+  plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs + 1] = b;
+  plan->pairs++;
 }
 
 /* Sorts the contributions of each group by column; by insertion, since there are few. */

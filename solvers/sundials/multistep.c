@@ -335,9 +335,8 @@ static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_bound_tolerances (r);
-  if (r->entries >
-      0) { /* the multipliers of the last Newton iterate, perhaps the prediction, are not accurate enough */
-    int order = 1;
+  if (r->entries > 0) {
+    int order = 1; /* multipliers of the last Newton iterate, which may be the prediction, are not accurate enough */
     if (d->sun.solver && pw_ledger_uses_multipliers (r)) (void)multistep_evaluate (d);
     pw_ledger_rates (r, r->lambda, r->rate);
     CVodeGetLastOrder (d->cvode, &order);
