@@ -447,7 +447,8 @@ void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
 /* Add a cell, after a comma unless it is the first of its line: a number by pw_format, nan if not finite; or text. */
 void pw_text_number (pw_text *t, double value);
 void pw_text_cell (pw_text *t, const char *text);
-/* Adds the cell "NAME [UNIT]", in quotes if the name has a comma; no unit if it is NULL or "". */
+/* Adds the cell "NAME [UNIT]", in quotes if the name has a comma; no unit if it is NULL or "".  Line ends in the name
+ * become blanks. */
 void pw_text_name (pw_text *t, const char *name, const char *unit);
 /* Adds a cell in quotes; line ends in it become blanks. */
 void pw_text_quoted (pw_text *t, const char *text);

@@ -203,20 +203,25 @@ void pw_text_number (pw_text *t, double value) {
   pw_text_cell (t, isfinite (value) ? PW_DIGITS (value, 17) : "nan");
 }
 
+/* Adds a text, whose line ends become blanks; between quotes, a quote in it is doubled. */
+static void text_add_in_line (pw_text *t, const char *text, int between_quotes) {
+  for (; *text; text++) {
+    if (between_quotes && *text == '"') pw_text_add (t, "\"");
+    pw_text_add_bytes (t, *text == '\n' || *text == '\r' ? " " : text, 1);
+  }
+}
+
 void pw_text_name (pw_text *t, const char *name, const char *unit) {
   const char *quote = strchr (name, ',') ? "\"" : "";
   pw_text_cell (t, quote);
-  pw_text_add (t, name);
+  text_add_in_line (t, name, *quote != 0);
   if (unit && *unit) pw_text_add (t, " ["), pw_text_add (t, unit), pw_text_add (t, "]");
   pw_text_add (t, quote);
 }
 
 void pw_text_quoted (pw_text *t, const char *text) {
   pw_text_cell (t, "\"");
-  for (; *text; text++) {
-    if (*text == '"') pw_text_add (t, "\"");
-    pw_text_add_bytes (t, *text == '\n' || *text == '\r' ? " " : text, 1);
-  }
+  text_add_in_line (t, text, 1);
   pw_text_add (t, "\"");
 }
 
