@@ -153,7 +153,7 @@ TEST (hammer) {
 
 static void limits_derivatives (const char *arguments, const double *expected, int count) {
   double value[CLI_MOST], error[CLI_MOST];
-  cli_good (check_text ("pinwheel sensitivity tests/models/events-%s --json @/sens/sensitivity.json --plots @/sens",
+  cli_good (check_text ("pinwheel sensitivity tests/models/events/%s --json @/sens/sensitivity.json --plots @/sens",
                         arguments));
   assert_int_equal (cli_sensitivity ("derivative", value), count);
   assert_int_equal (cli_sensitivity ("error", error), count);
@@ -212,7 +212,7 @@ TEST (derivatives_of_others) {
       value[k] =
           limits_value (of[i].scene, of[i].column, of[i].parameter, of[i].value + (k < 2 ? k - 2 : k - 1) * h, of[i].t);
     const double expected = (8 * (value[2] - value[1]) - (value[3] - value[0])) / (12 * h);
-    cli_good (check_text ("pinwheel sensitivity tests/models/events-%s.yaml -t %g --of %s --set %s=%.17g --by %s "
+    cli_good (check_text ("pinwheel sensitivity tests/models/events/%s.yaml -t %g --of %s --set %s=%.17g --by %s "
                           "--json @/sens/sensitivity.json --plots @/sens",
                           of[i].scene, of[i].t, of[i].column, of[i].parameter, of[i].value, of[i].parameter));
     assert_int_equal (cli_sensitivity ("derivative", &derivative), 1);

@@ -35,7 +35,7 @@ TEST (pendulum) {
 
 /* What a wheel uses of its grip is the extremum of its reaction in the run. */
 TEST (limits) {
-  static const char model[] = "tests/models/events-ride-on.yaml --set gA=0.5";
+  static const char model[] = "tests/models/events/ride-on.yaml --set gA=0.5";
   cli_good (check_text (
       "pinwheel check %s --json @/check.json && pinwheel run %s --of max:A.N --of min:A.N --json @/run.json", model,
       model));
@@ -44,7 +44,7 @@ TEST (limits) {
                used = cli_number (cli_file ("check.json"), "limits", "used", NULL);
   check_close ("used", used, fmax (high, -low) / 0.5, 1e-12, "the same run");
   assert_non_null (strstr (cli_file ("check.json"), "\"mode\": \"holds\", \"events\": 0, \"first\": null"));
-  cli_good ("pinwheel check tests/models/events-pendulum.yaml");
+  cli_good ("pinwheel check tests/models/events/pendulum.yaml");
   assert_non_null (strstr (cli_out, "free at the start; 6 events, the first at t = 0.713008 s"));
   /* lateral force and traction have one limit together, of which a part says nothing; there is no brake */
   cli_write ("rolls.yaml", "pinwheel: 1\nrun: {t_end: 1}\n"

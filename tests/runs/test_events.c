@@ -797,7 +797,7 @@ TEST (no_code) {
   pw_error error = { 0 };
   pw_system *s = runs_scene ("sleigh", "");
   assert_null (pw_system_source (s, NULL, &error));
-  check_error (&error, PW_INPUT, "model events-sleigh: specialised code has no limits of reactions, as by a grip");
+  check_error (&error, PW_INPUT, "model sleigh: specialised code has no limits of reactions, as by a grip");
   pw_system_free (s);
 }
 

@@ -33,7 +33,7 @@ pw_system *runs_scene (const char *scene, const char *sets) {
   char path[100], name[20];
   double value;
   int used;
-  snprintf (path, sizeof path, "tests/models/events-%s.yaml", scene);
+  snprintf (path, sizeof path, "tests/models/events/%s.yaml", scene);
   pw_file *f = pw_file_open (path, &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
   check_ok (error.status, &error);

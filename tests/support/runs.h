@@ -4,7 +4,7 @@
 
 #include "pinwheel-analysis.h"
 
-/* The system of tests/models/events-SCENE.yaml with parameters "NAME=VALUE NAME=VALUE". */
+/* The system of tests/models/events/SCENE.yaml with parameters "NAME=VALUE NAME=VALUE". */
 pw_system *runs_scene (const char *scene, const char *sets);
 
 pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings);
