@@ -85,8 +85,7 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
 /* The source text of a function signal in a text model. */
 typedef struct {
   const char *part[3]; /* expressions of value, rate, acceleration; NULL: not given */
-  const char
-      *jump; /* an operation in them that may jump within a step, as it reads states: "atan2 (a.y, a.x)"; or NULL */
+  const char *jump;    /* an operation that reads states and may jump within a step: "atan2 (a.y, a.x)"; or NULL */
 } pw_signal_text;
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
@@ -275,9 +274,8 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 /* An output: a number with a name, such as a tracking error, computed where a sample of a run is taken.  Tables have it
  * as a column, and analyses find it by its name.  It has no effect on the motion. */
 typedef struct {
-  const char
-      *name; /* a letter or _, then letters, digits and _, at most 63; differs from all other names and columns */
-  const char *unit;  /* an SI unit, "m", for display; NULL: none */
+  const char *name; /* a letter or _, then letters, digits and _, at most 63; not that of anything else, nor a column */
+  const char *unit; /* an SI unit, "m", for display; NULL: none */
   const char *about; /* what it means, in a few words; NULL: not said */
   /* `eval` stores value[0], for which x contains the columns that `reads` names: states ("car.y"), places of wheels and
    * markers ("pencil.x"), reactions ("B.Fx"), kinetic, potential, work, loss, works and losses of elements, outputs

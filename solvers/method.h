@@ -204,13 +204,12 @@ struct pw_run {
   double energy0, potential0; /* initial energy and potential energy [J]; energy0 includes changes by pw_run_restart */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (run.c) */
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
-  double
-      *integrand_size; /* integrals: the largest absolute value of each integrand so far, and at a state about L away */
-  double *integrand_state; /* 2 coords: the state at which integrands are evaluated */
-  double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see run.c */
-  double *scratch;         /* 2 (coords + 3) + 3 rows, for projections and evaluations */
-  double *atol;            /* 2 coords: absolute tolerances (pw_atol) */
-  double *tolerance_bound; /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
+  double *integrand_size;     /* integrals: the largest |integrand| so far, and at a state about L away */
+  double *integrand_state;    /* 2 coords: the state at which integrands are evaluated */
+  double scene_energy;        /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see run.c */
+  double *scratch;            /* 2 (coords + 3) + 3 rows, for projections and evaluations */
+  double *atol;               /* 2 coords: absolute tolerances (pw_atol) */
+  double *tolerance_bound;    /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
                                         * in which it is valid (pw_kind.saturation); only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */

@@ -2,8 +2,8 @@
  *
  * The step is halved as long as a function may become positive within a part: if the parabola through its values at
  * the ends and the middle, raised by its own bend, does.  In the smallest parts the largest value is searched for.  The
- * time is then located to round-off by inverse quadratic interpolation, safeguarded by bisection, so that functions that
- * jump are located, too. */
+ * time is then located to round-off by inverse quadratic interpolation, safeguarded by bisection, so that jumps are
+ * located, too. */
 #include <float.h>
 #include <math.h>
 #include "crossing.h"

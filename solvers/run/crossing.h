@@ -12,7 +12,7 @@ typedef struct {
   double *memory; /* (PW_CROSSING_DEPTH + 2) x count */
   double width;   /* to which a time is located; 0: to round-off */
   double small;   /* a positive value up to this one is at the root; 0: only the width counts */
-  /* A time before the step and the values there; NULL unless functions that may be positive in the step increase in it. */
+  /* A time before the step and the values there; NULL unless functions that may be positive in it increase in it. */
   double before;
   const double *at_before;
   pw_error *error;
