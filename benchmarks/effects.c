@@ -229,28 +229,35 @@ static long effects_step (void *context, long n) {
   return n;
 }
 
-/* Marks the steps of a run that find an event, or restart after one.  Returns the number of events. */
-static long effects_find (int steering, unsigned char *marked) {
+/* A run with events: 1 for steps that find one or restart after one; the numbers of steps made, and of events. */
+typedef struct {
+  unsigned char marked[EFFECTS_STEPS];
+  int steps;
+  long events;
+} effects_run;
+
+static effects_run effects_find (int steering) {
+  effects_run found = { 0 };
   pw_system *s;
   pw_run *r = effects_open ("grip", steering, 1e-2, &s);
-  long known = r->event_count, events = -known;
-  for (int i = 0; i < EFFECTS_STEPS && pw_run_time (r) < 20; i++, known = r->event_count) {
+  for (int i = 0; i < EFFECTS_STEPS && pw_run_time (r) < 20; found.steps = ++i) {
+    const long known = r->event_count;
     effects_step (r, 1);
-    if (r->event_count > known) marked[i] = marked[i - 1] = 1;
+    if (i == 0 || r->event_count == known) continue;
+    found.marked[i] = found.marked[i - 1] = 1;
+    found.events += r->event_count - known;
   }
-  events += known;
   effects_close (r, s);
-  return events;
+  return found;
 }
 
 /* The process that callgrind counts: of a run with events the marked steps, or the others. */
 static int effects_event_child (int marked_ones, int steering) {
-  static unsigned char marked[EFFECTS_STEPS];
+  const effects_run found = effects_find (steering);
   pw_system *s;
-  effects_find (steering, marked);
   pw_run *r = effects_open ("grip", steering, 1e-2, &s);
-  for (int i = 0; i < EFFECTS_STEPS && pw_run_time (r) < 20; i++)
-    marked[i] == marked_ones ? engine_counted (&(timing_work){ effects_step, r }, 1) : effects_step (r, 1);
+  for (int i = 0; i < found.steps; i++)
+    found.marked[i] == marked_ones ? engine_counted (&(timing_work){ effects_step, r }, 1) : effects_step (r, 1);
   effects_close (r, s);
   return 0;
 }
@@ -258,16 +265,15 @@ static int effects_event_child (int marked_ones, int steering) {
 static void effects_event (const char *program) {
   printf ("\nan event, at which wheel A slides or holds; the restart of the method; evaluations of an ordinary step\n");
   for (int steering = 0; steering < 2; steering++) {
-    unsigned char marked[EFFECTS_STEPS] = { 0 };
-    const long events = effects_find (steering, marked);
-    long steps = 0, ordinary = 0;
-    for (int i = 0; i < EFFECTS_STEPS; i++) *(marked[i] ? &steps : &ordinary) += 1;
+    const effects_run found = effects_find (steering);
+    int marked = 0;
+    for (int i = 0; i < found.steps; i++) marked += found.marked[i];
     const char *name = effects_steering[steering];
-    const double step = engine_count (program, "ordinary", name, "pw_run_advance") / (double)ordinary;
-    const double all = engine_count (program, "event", name, "pw_run_advance") - (double)steps * step;
-    const double restart = engine_count (program, "event", name, "pw_run_renew") / (double)events,
+    const double step = engine_count (program, "ordinary", name, "pw_run_advance") / (found.steps - marked);
+    const double all = engine_count (program, "event", name, "pw_run_advance") - marked * step;
+    const double restart = engine_count (program, "event", name, "pw_run_renew") / (double)found.events,
                  evaluation = step / 4;
-    const double rest = all / (double)events - restart;
+    const double rest = all / (double)found.events - restart;
     printf ("%-50s %10.0f %10.0f\n", name, rest, restart);
     printf ("%-50s %10.1f %10.1f\n", "  in evaluations", rest / evaluation, restart / evaluation);
   }
@@ -326,6 +332,7 @@ int main (int argc, char **argv) {
     return effects_child (argv[2], argv[3]);
   }
   if (argc == 2 && strcmp (argv[1], "--kinds") == 0) return effects_list_kinds ();
+  engine_check_arguments (argc, argv, 1, "usage: effects [FOLDER]");
   printf ("instructions per evaluation, steering with mass and without; difference to the EzyRoller alone\n\n");
   effects_library (argv[0], "all kinds", all);
   if (argc == 2) {

@@ -328,6 +328,7 @@ static int engine_child (const char *key, const char *side) {
 int main (int argc, char **argv) {
   char machine[100], path[160], part[170];
   if (argc == 4 && strcmp (argv[1], "--count") == 0) return engine_child (argv[2], argv[3]);
+  engine_check_arguments (argc, argv, argc, "usage: engine [KEY]...");
   engine_report r = { .program = argv[0], .only = argc > 1 ? argv + 1 : NULL };
   engine_machine (machine, sizeof machine);
   snprintf (path, sizeof path, "benchmarks/results/engine-%s.csv", machine);

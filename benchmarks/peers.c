@@ -203,6 +203,7 @@ int main (int argc, char **argv) {
     engine_counted (&(timing_work){ peers_once, &job }, 1);
     return 0;
   }
+  engine_check_arguments (argc, argv, 1, "usage: peers [CSV]");
   FILE *csv = argc > 1 ? fopen (argv[1], "w") : NULL;
   if (argc > 1 && csv == NULL) engine_die (argv[1], "cannot be written");
   peers_open ();

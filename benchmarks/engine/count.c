@@ -10,6 +10,12 @@ _Noreturn void engine_die (const char *what, const char *why) {
   exit (2);
 }
 
+void engine_check_arguments (int argc, char **argv, int most, const char *usage) {
+  if (argc - 1 > most) engine_die (argv[0], usage);
+  for (int i = 1; i < argc; i++)
+    if (argv[i][0] == '-') engine_die (argv[i], usage);
+}
+
 long engine_counted (const timing_work *w, long n) {
   return w->run (w->context, n);
 }

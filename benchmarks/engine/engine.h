@@ -32,6 +32,8 @@ struct engine_case {
 
 /* Ends the program with a message; exit status 2. */
 _Noreturn void engine_die (const char *what, const char *why);
+/* The same, with the program's usage, if there are more than `most` arguments, or one that looks like an option. */
+void engine_check_arguments (int argc, char **argv, int most, const char *usage);
 
 /* ---- Scenes ---- */
 
