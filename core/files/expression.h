@@ -78,8 +78,10 @@ void pw_expression_release_paths (const pw_expression *expression);
  * be NULL.  PW_INPUT, error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **expression, pw_expression_error *error);
-/* The same of an expression without variables: its value, which may be non-finite.  The scope may be NULL. */
-int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error);
+/* The same of an expression that is evaluated once: its value for these values of the variables, which may be
+ * non-finite.  The scope may be NULL, and so may variables and values. */
+int pw_expression_constant (const pw_scope *s, const char *const *variable, const double *values, const char *text,
+                            double *value, pw_expression_error *error);
 
 /* The value, which may be non-finite; at a jump in time, that just after it. */
 double pw_expression_value (const pw_expression *expression, const double *variable);

@@ -541,17 +541,19 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
   return PW_OK;
 }
 
-int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error) {
+int pw_expression_constant (const pw_scope *s, const char *const *variable, const double *values, const char *text,
+                            double *value, pw_expression_error *error) {
   parser p;
   if (pw_expression_number (text, value)) return PW_OK;
-  if (parser_read (&p, s, NULL, text, error) == PW_OK) *value = p.code[0].value;
+  if (parser_read (&p, s, variable, text, error) == PW_OK)
+    *value = pw_expression_run (p.code, p.codes, values, &(int){ 0 });
   return p.status;
 }
 
 int pw_read_expression (const char *text, double *value) {
   pw_expression_error error;
   if (pw_read_number (text, value) == PW_OK) return PW_OK;
-  return pw_expression_constant (NULL, text, value, &error);
+  return pw_expression_constant (NULL, NULL, NULL, text, value, &error);
 }
 
 /* ---- Formulas: expressions of named numbers, none of which is the time ---- */

@@ -20,7 +20,7 @@ typedef struct pw_node {
     struct pw_node *first; /* of a list or map */
   };
   unsigned at;           /* offset in the source, of the opening quote or bracket if there is one */
-  int count;             /* entries of a list, pairs of a map; of a scalar 0, or its number in a copy (pw_copies) */
+  int count;             /* entries of a list, pairs of a map */
   unsigned char type;    /* pw_yaml_type */
   unsigned char quoted;  /* 1: in quotes, or a block after | or > */
   unsigned char is_file; /* 1: the map of an included file, in place of its name */

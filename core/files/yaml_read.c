@@ -5,85 +5,49 @@
 
 /* Copies of an entry with the key `repeat`, for one value of a counter after another. */
 typedef struct pw_copies {
-  const pw_scope *scope; /* given: names besides the counter in numbers */
   pw_arena *arena;       /* given */
+  const pw_scope *scope; /* given: names besides the counter in numbers */
   const pw_node *repeat; /* given: the key */
   const char *counter;   /* given: its name */
   int i;                 /* its value */
   pw_node *entry;        /* the copy, without the key */
-  struct pw_copy_text *text;
-  int scalars;                  /* texts without braces, numbered from 1 */
-  const pw_expression **number; /* scalars + 1: those read as numbers so far */
-  double bytes;                 /* of the texts of all copies so far */
-  const pw_node *faulty;        /* after PW_INPUT: the text, and the error in it */
+  struct pw_copy_text *text, **last;
+  double bytes;          /* of the texts of all copies so far */
+  const pw_node *faulty; /* after PW_INPUT: the text, and the error in it */
   pw_expression_error fault;
 } pw_copies;
 
 /* Copies differ only in texts with braces, such as "link{i - 1}".  The entry is therefore copied once, with a list of
  * these texts.  For each value of the counter only they are replaced. */
-
-enum { COPY_TEXT = 4000 /* bytes of a text with braces, at most */ };
-#define COPY_NUMBER 1e9 /* largest number in braces */
-
-/* Part of a text: some bytes, then a number in braces unless it is the last part. */
-typedef struct copy_part {
-  struct copy_part *next;
-  const char *bytes;
-  size_t size;
-  const pw_expression *number; /* or NULL */
-} copy_part;
-
 struct pw_copy_text {
   struct pw_copy_text *next;
   const pw_node *source; /* in the entry */
   pw_node *node;         /* in the copy */
-  copy_part *first;
 };
+
+enum { COPY_TEXT = 4000 /* bytes of a text with braces, at most */ };
+#define COPY_NUMBER 1e9 /* largest number in braces */
 
 /* Records an error at an offset of a text. */
 #define copy_fail(c, node, offset, ...)                                                                         \
   ((c)->faulty = node, (c)->fault.at = offset, pw_print ((c)->fault.text, sizeof (c)->fault.text, __VA_ARGS__), \
    PW_INPUT)
 
-/* Reads an expression of the counter, which is not its first variable: that is the time. */
-static int copy_expression (pw_copies *c, const char *text, const pw_expression **x, pw_expression_error *error) {
-  return pw_expression_read (c->scope, (const char *const[]){ "", c->counter, NULL }, text, c->arena, x, error);
-}
-
-static double copy_value (const pw_copies *c, const pw_expression *x) {
-  return pw_expression_value (x, (const double[2]){ 0, c->i });
-}
-
-/* Divides the text at *rest into bytes and a number; *rest is NULL after the last part. */
-static int copy_part_read (pw_copies *c, const pw_node *source, const char **rest, copy_part *part) {
-  const char *open = strchr (*rest, '{');
-  part->bytes = *rest;
-  part->size = open ? (size_t)(open - *rest) : strlen (*rest);
-  *rest = NULL;
-  if (open == NULL) return PW_OK;
-  const size_t at = (size_t)(open - source->text) + 1, size = strcspn (open + 1, "}");
-  if (open[1 + size] == 0) return copy_fail (c, source, at - 1, "there is no \"}\" for this \"{\"");
-  *rest = open + size + 2;
-  int status = copy_expression (c, PW_PRINTED (COPY_TEXT + 1, "%.*s", (int)size, open + 1), &part->number, &c->fault);
-  c->faulty = source;
-  c->fault.at += at;
-  return status;
+/* The value of an expression, perhaps of the counter of copies, which is not its first variable: that is the time. */
+static int copy_value (const pw_copies *c, const pw_scope *s, const char *text, double *value,
+                       pw_expression_error *error) {
+  return pw_expression_constant (s, c ? (const char *const[]){ "", c->counter, NULL } : NULL,
+                                 (const double[]){ 0, c ? c->i : 0 }, text, value, error);
 }
 
 static int copy_text (pw_copies *c, const pw_node *source, pw_node *node) {
-  struct pw_copy_text *t = pw_arena_alloc (c->arena, sizeof *t);
-  copy_part **to = t ? &t->first : NULL;
-  int status = PW_OK;
+  struct pw_copy_text *t = *c->last = pw_arena_alloc (c->arena, sizeof *t);
   if (t == NULL) return PW_RESOURCE;
   if (strlen (source->text) > COPY_TEXT)
     return copy_fail (c, source, 0, "a text with braces has at most %d bytes", COPY_TEXT);
-  *t = (struct pw_copy_text){ c->text, source, node, NULL };
-  c->text = t;
-  for (const char *rest = source->text; rest && status == PW_OK; to = &(*to)->next) {
-    if ((*to = pw_arena_alloc (c->arena, sizeof **to)) == NULL) return PW_RESOURCE;
-    status = copy_part_read (c, source, &rest, *to);
-  }
-  return status;
+  *t = (struct pw_copy_text){ NULL, source, node };
+  c->last = &t->next;
+  return PW_OK;
 }
 
 /* The key `repeat` of an entry, or NULL. */
@@ -109,8 +73,6 @@ static int copy_nodes (pw_copies *c, const pw_node *from, pw_node **to) {
       (*to)->first = NULL, status = copy_nodes (c, n->first, &(*to)->first);
     else if (n->type == PW_YAML_SCALAR && strchr (n->text, '{'))
       status = copy_text (c, n, *to);
-    else if (n->type == PW_YAML_SCALAR)
-      (*to)->count = ++c->scalars;
     to = &(*to)->next;
   }
   return status;
@@ -121,9 +83,25 @@ static int copies_open (pw_copies *c, const pw_node *entry) {
   *c->entry = *entry;
   c->entry->next = c->entry->first = NULL;
   c->entry->count--;
-  int status = copy_nodes (c, entry->first, &c->entry->first);
-  c->number = pw_arena_alloc (c->arena, ((size_t)c->scalars + 1) * sizeof *c->number);
-  return status == PW_OK && c->number == NULL ? PW_RESOURCE : status;
+  return copy_nodes (c, entry->first, &c->entry->first);
+}
+
+/* Writes the number in the braces that open at *at in a text, and moves *at behind them. */
+static int copies_write_number (pw_copies *c, const pw_node *source, const char **at, char number[20]) {
+  const char *begin = *at + 1;
+  const size_t offset = (size_t)(begin - source->text), size = strcspn (begin, "}");
+  double value = 0;
+  if (begin[size] == 0) return copy_fail (c, source, offset - 1, "there is no \"}\" for this \"{\"");
+  int status = copy_value (c, c->scope, PW_PRINTED (COPY_TEXT + 1, "%.*s", (int)size, begin), &value, &c->fault);
+  c->faulty = source, c->fault.at += offset;
+  if (status != PW_OK) return status;
+  value += 0;                                                          /* not -0 */
+  if (!(value >= 0 && value <= COPY_NUMBER && value == floor (value))) /* -1 would be a difference: "z-1" */
+    return copy_fail (c, source, offset - 1, "the value in braces is %g for %s = %d: expected a whole number >= 0",
+                      value, c->counter, c->i);
+  *at = begin + size + 1;
+  snprintf (number, 20, "%ld", (long)value);
+  return PW_OK;
 }
 
 /* Makes c->entry the copy for this value.  Its texts stay in the arena. */
@@ -132,30 +110,18 @@ static int copies_set (pw_copies *c, int i) {
   c->i = i;
   for (const struct pw_copy_text *t = c->text; t; t = t->next) {
     char *end = text;
-    for (const copy_part *p = t->first; p; p = p->next) {
-      memcpy (end, p->bytes, p->size);
-      end += p->size;
-      if (p->number == NULL) continue;
-      double value = copy_value (c, p->number) + 0;                        /* not -0 */
-      if (!(value >= 0 && value <= COPY_NUMBER && value == floor (value))) /* -1 would be a difference: "z-1" */
-        return copy_fail (c, t->source, (size_t)(p->bytes - t->source->text) + p->size,
-                          "the value in braces is %g for %s = %d: expected a whole number >= 0", value, c->counter, i);
-      end += snprintf (end, 20, "%ld", (long)value);
+    for (const char *from = t->source->text; *from;) {
+      const size_t n = strcspn (from, "{");
+      memcpy (end, from, n);
+      *(end += n) = 0, from += n;
+      const int status = *from ? copies_write_number (c, t->source, &from, end) : PW_OK;
+      if (status != PW_OK) return status;
+      end += strlen (end);
     }
-    *end = 0;
     c->bytes += (double)(end - text);
     if ((t->node->text = pw_arena_copy (c->arena, text)) == NULL) return PW_RESOURCE;
   }
   return PW_OK;
-}
-
-/* Stores the value of a text of the copy that is a number.  PW_INPUT, error; PW_RESOURCE. */
-static int copies_number (pw_copies *c, const pw_node *node, double *value, pw_expression_error *error) {
-  const pw_expression *own = NULL, **x = node->count ? &c->number[node->count] : &own;
-  c->bytes += node->count ? 0 : (double)strlen (node->text);
-  int status = *x ? PW_OK : copy_expression (c, node->text, x, error);
-  if (status == PW_OK) *value = copy_value (c, *x);
-  return status;
 }
 
 /* What replaces a name, or NULL. */
@@ -339,8 +305,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return read_fail (r, node->at, "%s: expected a number, found %s", label, pw_node_found (node));
-  int status = r->copies ? copies_number (r->copies, node, value, &error)
-                         : pw_expression_constant (r->scope, node->text, value, &error);
+  int status = copy_value (r->copies, r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status == PW_INPUT) suggest_state (r, node->text, &error);
   if (status == PW_INPUT && r->field && r->scope && label == r->label) refuse_unit (r, node->text, &error);
@@ -423,7 +388,7 @@ static int read_copy (pw_reader *r, const pw_node *entry, read_entry *each) {
 }
 
 static int read_copies (pw_reader *r, const pw_node *entry, const pw_node *repeat, read_entry *each) {
-  pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat }, *outer = r->copies;
+  pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat, .last = &c.text }, *outer = r->copies;
   int count = 0, status;
   r->copies = NULL; /* also where an entry of another list is being read */
   if (read_repeat (r, repeat, &c.counter, &count) != PW_OK) return r->error->status;

@@ -392,7 +392,7 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
     expression_try (x, text);
   else if (trouble.at > strlen (text) || *trouble.text == 0)
     abort ();
-  pw_expression_constant (NULL, text, &value, &trouble);
+  pw_expression_constant (NULL, NULL, NULL, text, &value, &trouble);
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
     if (p < text || rest > text + strlen (text) || strncmp (p, name, strlen (name)) != 0) abort ();
   pw_expression_number (text, &value);
