@@ -111,27 +111,14 @@ void pw_arena_free (pw_arena *a) {
   }
 }
 
-void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
-  void *p = l->base ? l->base + l->used : NULL;
-  l->used += store_round (count * size, STORE_ALIGN);
-  return p;
-}
-
-int pw_layout_pass (pw_layout *l, char **memory) {
-  if (l->base) return 0;
-  if (l->used == 0) { /* no pass has begun; the first one counts from 1 */
-    *memory = NULL;
-    l->used = 1;
-    return 1;
-  }
-  *l = (pw_layout){ *memory = calloc (1, l->used), 0 };
-  return l->base != NULL;
-}
-
 char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
-  char *memory;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);)
-    for (size_t i = 0; i < arrays; i++) *array[i].at = pw_layout_alloc (&l, array[i].count, sizeof (double));
+  size_t bytes = 1;
+  for (size_t i = 0; i < arrays; i++) bytes += store_round (array[i].count * array[i].size, STORE_ALIGN);
+  char *memory = calloc (1, bytes), *at = memory;
+  for (size_t i = 0; i < arrays; i++) { /* pointers to any type */
+    memcpy (array[i].at, &at, sizeof at);
+    if (memory) at += store_round (array[i].count * array[i].size, STORE_ALIGN);
+  }
   return memory;
 }
 

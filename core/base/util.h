@@ -137,24 +137,17 @@ void *pw_arena_alloc (pw_arena *a, size_t bytes);    /* zeroed, or NULL */
 char *pw_arena_copy (pw_arena *a, const char *text); /* or NULL */
 void pw_arena_free (pw_arena *a);
 
-/* Lays out arrays in one allocation.  The same calls of pw_layout_alloc are made twice: first with base NULL, where
- * they only add up the size and return NULL, then with the allocated memory. */
+/* An array: where its address is stored, number and size of its entries. */
 typedef struct {
-  char *base;
-  size_t used;
-} pw_layout;
-void *pw_layout_alloc (pw_layout *l, size_t count, size_t size);
-/* Begins each of the two passes of  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);) { calls }.  Zeroed memory
- * is allocated for the second one; *memory is NULL if that failed. */
-int pw_layout_pass (pw_layout *l, char **memory);
-
-/* An array of numbers: where its address is stored, and its length. */
-typedef struct {
-  double **at;
-  size_t count;
+  void *at;
+  size_t count, size;
 } pw_array;
+#define PW_ARRAY(pointer, count) \
+  { &(pointer), (size_t)(count), sizeof *(pointer) }
 /* Lays out arrays in one zeroed allocation and returns it; if out of memory, NULL, and so are all pointers. */
 char *pw_alloc_arrays (const pw_array *array, size_t arrays);
+#define PW_ALLOC_ARRAYS(...) \
+  pw_alloc_arrays ((const pw_array[]){ __VA_ARGS__ }, sizeof ((const pw_array[]){ __VA_ARGS__ }) / sizeof (pw_array))
 
 /* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  For libraries that crash if an allocation fails. */
 int pw_check_memory (size_t bytes);

@@ -98,13 +98,12 @@ static int probe_open (probe *x, pw_error *error) {
   size_t n = (size_t)x->s->coords, rows = (size_t)(x->elements * x->rows), w = (size_t)(x->elements * x->cols);
   size_t J = rows * (size_t)x->cols + PROBE_GUARD, eta = rows + PROBE_GUARD;
   size_t m = (size_t)(x->elements * x->width) + PROBE_GUARD, block = m * (size_t)x->width;
-  const pw_array array[] = {
-    { &x->q, n },     { &x->v, n },     { &x->a, n },     { &x->dq, n },         { &x->dv, n },
-    { &x->q_now, n }, { &x->v_now, n }, { &x->w, w },     { &x->lambda, rows },  { &x->J, J },
-    { &x->eta, eta }, { &x->plus, m },  { &x->minus, m }, { &x->derivative, m }, { &x->value, m },
-    { &x->terms, m }, { &x->size, m },  { &x->error, m }, { &x->expected, m },   { &x->block, block },
-  };
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->memory = PW_ALLOC_ARRAYS (PW_ARRAY (x->q, n), PW_ARRAY (x->v, n), PW_ARRAY (x->a, n), PW_ARRAY (x->dq, n),
+                               PW_ARRAY (x->dv, n), PW_ARRAY (x->q_now, n), PW_ARRAY (x->v_now, n), PW_ARRAY (x->w, w),
+                               PW_ARRAY (x->lambda, rows), PW_ARRAY (x->J, J), PW_ARRAY (x->eta, eta),
+                               PW_ARRAY (x->plus, m), PW_ARRAY (x->minus, m), PW_ARRAY (x->derivative, m),
+                               PW_ARRAY (x->value, m), PW_ARRAY (x->terms, m), PW_ARRAY (x->size, m),
+                               PW_ARRAY (x->error, m), PW_ARRAY (x->expected, m), PW_ARRAY (x->block, block));
   x->batch->b.w = x->w, x->batch->b.lambda = x->lambda;
   return x->memory ? PW_OK : pw_fail_memory (x->s, error);
 }

@@ -116,12 +116,10 @@ int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double
   if (s == NULL) return PW_INPUT;
   size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
   verified_scene scene = { .s = s };
-  const pw_array array[] = {
-    { &scene.position.sum, rows },  { &scene.position.size, rows },    { &scene.velocity.sum, rows },
-    { &scene.velocity.size, rows }, { &scene.acceleration.sum, rows }, { &scene.acceleration.size, rows },
-    { &scene.force.sum, coords },   { &scene.force.size, coords },
-  };
-  char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  char *memory = PW_ALLOC_ARRAYS (PW_ARRAY (scene.position.sum, rows), PW_ARRAY (scene.position.size, rows),
+                                  PW_ARRAY (scene.velocity.sum, rows), PW_ARRAY (scene.velocity.size, rows),
+                                  PW_ARRAY (scene.acceleration.sum, rows), PW_ARRAY (scene.acceleration.size, rows),
+                                  PW_ARRAY (scene.force.sum, coords), PW_ARRAY (scene.force.size, coords));
   pw_workspace *w = memory ? pw_workspace_new (s, NULL) : NULL;
   int status = PW_RESOURCE;
   if (w) {

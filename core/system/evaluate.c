@@ -721,22 +721,15 @@ void pw_close_functions (const pw_source *source, int sources, const pw_compiled
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
   pw_workspace all = { .s = s, .scale = s->scale, .t_signal = NAN }, *w = NULL;
-  char *memory;
   double *x = NULL;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);) {
-    w = pw_layout_alloc (&l, 1, sizeof *w);
-    all.batch = pw_layout_alloc (&l, (size_t)s->batches, sizeof *all.batch);
-    all.source = pw_layout_alloc (&l, (size_t)s->sources, sizeof *all.source);
-    all.configuration = pw_layout_alloc (&l, (size_t)s->bodies + 1, sizeof *all.configuration);
-    all.scratch = pw_layout_alloc (&l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *all.scratch);
-    all.u = pw_layout_alloc (&l, 3 * (size_t)s->sources, sizeof *all.u);
-    all.J = pw_layout_alloc (&l, s->jacobian, sizeof *all.J);
-    all.block = pw_layout_alloc (&l, s->block, sizeof *all.block);
-    all.contact = pw_layout_alloc (&l, (size_t)pw_system_contacts (s), sizeof *all.contact);
-    all.output = pw_layout_alloc (&l, (size_t)s->outputs, sizeof *all.output);
-    all.output_value = pw_layout_alloc (&l, (size_t)s->outputs, sizeof *all.output_value);
-    x = pw_layout_alloc (&l, 2 * (size_t)s->reads, sizeof *x);
-  }
+  PW_ALLOC_ARRAYS (/* w is the first: it is what pw_workspace_free frees */
+                   PW_ARRAY (w, 1), PW_ARRAY (all.batch, s->batches), PW_ARRAY (all.source, s->sources),
+                   PW_ARRAY (all.configuration, s->bodies + 1),
+                   PW_ARRAY (all.scratch, (size_t)(3 * s->rows + s->coords) + 3),
+                   PW_ARRAY (all.u, 3 * (size_t)s->sources), PW_ARRAY (all.J, s->jacobian),
+                   PW_ARRAY (all.block, s->block), PW_ARRAY (all.contact, pw_system_contacts (s)),
+                   PW_ARRAY (all.output, s->outputs), PW_ARRAY (all.output_value, s->outputs),
+                   PW_ARRAY (x, 2 * (size_t)s->reads));
   if (w) {
     *w = all;
     workspace_fill (w, x);
@@ -867,16 +860,12 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
 
 static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *error) {
   size_t n = (size_t)s->coords, rows = (size_t)s->rows;
-  double *indices;
-  const pw_array array[] = { { &out->mass, n },      /* first: it is what pw_equations_free frees */
-                             { &out->force, n + 3 }, /* three more entries: the ground's */
-                             { &out->g, rows },        { &out->eta, rows },
-                             { &out->gamma, rows },    { &out->value, s->jacobian },
-                             { &indices, s->jacobian } }; /* two indices fit in one double */
   out->coordinates = s->coords, out->rows = s->rows, out->holonomic = s->holonomic;
-  if (pw_alloc_arrays (array, sizeof array / sizeof *array) == NULL) return pw_fail_memory (s, error);
-  out->row = (int *)(void *)indices;
-  out->column = out->row + s->jacobian;
+  /* mass is the first: it is what pw_equations_free frees; three more entries of the forces: the ground's */
+  if (PW_ALLOC_ARRAYS (PW_ARRAY (out->mass, n), PW_ARRAY (out->force, n + 3), PW_ARRAY (out->g, rows),
+                       PW_ARRAY (out->eta, rows), PW_ARRAY (out->gamma, rows), PW_ARRAY (out->value, s->jacobian),
+                       PW_ARRAY (out->row, s->jacobian), PW_ARRAY (out->column, s->jacobian)) == NULL)
+    return pw_fail_memory (s, error);
   return PW_OK;
 }
 

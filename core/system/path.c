@@ -102,10 +102,8 @@ enum { PATH_REPEATED = 64 };
 static int make_all_pieces (pw_path *p, const double *x, const double *y, int count, pw_error *error) {
   const int before = p->closed && !p->is_linear ? PATH_REPEATED : 0, n = count + p->closed + 2 * before;
   double *t, *point[2], *spline; /* of n points: distances, x and y; 2 n: of one of these (pw_table_spline) */
-  const pw_array array[] = {
-    { &t, (size_t)n }, { &point[0], (size_t)n }, { &point[1], (size_t)n }, { &spline, 4 * (size_t)n }
-  };
-  char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  char *memory = PW_ALLOC_ARRAYS (PW_ARRAY (t, n), PW_ARRAY (point[0], n), PW_ARRAY (point[1], n),
+                                  PW_ARRAY (spline, 4 * (size_t)n));
   size_t room = 0;
   if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < n; i++) {

@@ -168,23 +168,20 @@ int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *er
   pw_branch_point *const point[] = {
     &b->reached, &b->previous, &b->found, &b->first, &b->next, &b->side[0], &b->side[1]
   };
-  enum { OWN = sizeof point / sizeof *point, POINTS = OWN + PW_BRANCH_QUEUE };
-  pw_array array[2 * POINTS + 7] = { { &b->F, large },    { &b->J, m * n },
-                                     { &b->du, large },   { &b->work, (size_t)b->work_size },
-                                     { &b->trial, n },    { &b->condition, n },
-                                     { &b->predicted, n } };
-  for (int i = 0; i < POINTS; i++) {
-    pw_branch_point *p = i < OWN ? point[i] : &b->queue[i - OWN].point;
-    array[2 * i + 7] = (pw_array){ &p->u, n }, array[2 * i + 8] = (pw_array){ &p->tangent, n };
+  const size_t own = sizeof point / sizeof *point, points = own + PW_BRANCH_QUEUE;
+  double *numbers; /* of all points */
+  b->memory = PW_ALLOC_ARRAYS (PW_ARRAY (b->F, large), PW_ARRAY (b->J, m * n), PW_ARRAY (b->du, large),
+                               PW_ARRAY (b->work, b->work_size), PW_ARRAY (b->trial, n), PW_ARRAY (b->condition, n),
+                               PW_ARRAY (b->predicted, n), PW_ARRAY (b->pivot, n), PW_ARRAY (numbers, 2 * points * n));
+  for (size_t i = 0; b->memory && i < points; i++, numbers += 2 * n) {
+    pw_branch_point *p = i < own ? point[i] : &b->queue[i - own].point;
+    p->u = numbers, p->tangent = numbers + n;
   }
-  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  b->pivot = malloc (n * sizeof *b->pivot);
-  return b->memory && b->pivot ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return b->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 void pw_branch_close (pw_branch *b) {
   free (b->memory);
-  free (b->pivot);
 }
 
 static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {

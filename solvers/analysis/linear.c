@@ -146,25 +146,13 @@ void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in
 
 static int linear_arrays (pw_linearisation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = (size_t)x->size;
-  const pw_array array[] = { { &x->a, n + 3 },
-                             { &x->lambda, m },
-                             { &x->norm, m },
-                             { &x->R, m * n },
-                             { &x->Q, n * n },
-                             { &x->dx, 2 * n },
-                             { &x->product, n + 2 * m },
-                             { &x->da, n + 3 },
-                             { &x->scratch, n + 3 * m + 3 },
-                             { &x->row_scratch, m },
-                             { &x->symmetry, 3 * size },
-                             { &x->later, 2 * n },
-                             { &x->probe, 2 * n },
-                             { &x->probe_a, n },
-                             { &x->probe_da, n },
-                             { &x->residual, 3 * (2 * m + n) },
-                             { &x->left_vectors, x->modes ? size * size + size : 0 },
-                             { &x->upper_rows, 4 * size } };
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->memory = PW_ALLOC_ARRAYS (
+      PW_ARRAY (x->a, n + 3), PW_ARRAY (x->lambda, m), PW_ARRAY (x->norm, m), PW_ARRAY (x->R, m * n),
+      PW_ARRAY (x->Q, n * n), PW_ARRAY (x->dx, 2 * n), PW_ARRAY (x->product, n + 2 * m), PW_ARRAY (x->da, n + 3),
+      PW_ARRAY (x->scratch, n + 3 * m + 3), PW_ARRAY (x->row_scratch, m), PW_ARRAY (x->symmetry, 3 * size),
+      PW_ARRAY (x->later, 2 * n), PW_ARRAY (x->probe, 2 * n), PW_ARRAY (x->probe_a, n), PW_ARRAY (x->probe_da, n),
+      PW_ARRAY (x->residual, 3 * (2 * m + n)), PW_ARRAY (x->left_vectors, x->modes ? size * size + size : 0),
+      PW_ARRAY (x->upper_rows, 4 * size));
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 

@@ -550,23 +550,12 @@ static int periodic_same (void *periodic, const double *u, const double *other) 
 
 static int periodic_arrays (pw_periodic *x) {
   size_t n = (size_t)x->n, states = 2 * n, all = states + (size_t)x->symmetries + 2; /* of u */
-  const pw_array array[] = {
-    { &x->u, all },
-    { &x->y0, states },
-    { &x->y1, states },
-    { &x->a0, n },
-    { &x->a1, n },
-    { &x->state, states },
-    { &x->change, states },
-    { &x->Phi, states * states },
-    { &x->basis, states * states },
-    { &x->dual, states * states },
-    { &x->monodromy, (2 * states + 1 + PERIODIC_WORK) * states },
-    { &x->re, states },
-    { &x->im, states },
-    { &x->work, (size_t)pw_steady_rate_count (x->s) + all },
-  };
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->memory = PW_ALLOC_ARRAYS (
+      PW_ARRAY (x->u, all), PW_ARRAY (x->y0, states), PW_ARRAY (x->y1, states), PW_ARRAY (x->a0, n),
+      PW_ARRAY (x->a1, n), PW_ARRAY (x->state, states), PW_ARRAY (x->change, states),
+      PW_ARRAY (x->Phi, states * states), PW_ARRAY (x->basis, states * states), PW_ARRAY (x->dual, states * states),
+      PW_ARRAY (x->monodromy, (2 * states + 1 + PERIODIC_WORK) * states), PW_ARRAY (x->re, states),
+      PW_ARRAY (x->im, states), PW_ARRAY (x->work, (size_t)pw_steady_rate_count (x->s) + all));
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 

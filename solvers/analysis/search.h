@@ -64,8 +64,7 @@ struct pw_steady {
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
   int sought;            /* index of the eigenvalue whose change of sign is located */
   int neutral_at_ends;   /* `neutral` at both ends of the step; -1: they differ */
-  char *memory;          /* of the numbers */
-  pw_arena arena;        /* of the other arrays */
+  char *memory;
 };
 
 /* The rates of a displacement [L/s, rad/s]: of the whole along x and y, its rotation about the origin; then of the

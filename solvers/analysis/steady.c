@@ -437,28 +437,15 @@ int pw_check_search (double first, double last, int points, pw_error *error) {
 static int steady_arrays (pw_steady *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), unknowns = n + rates;
   size_t holds = (size_t)x->settings.holds;
-  const pw_array array[] = {
-    { &x->symmetry, rates * rates },
-    { &x->free_symmetry, rates * rates },
-    { &x->norm, m },
-    { &x->start, 2 * n },
-    { &x->q, n + 3 },
-    { &x->v, n + 3 },
-    { &x->rates, rates },
-    { &x->combined, rates },
-    { &x->u, unknowns + 1 },
-    { &x->F, n * rates + (1 + STEADY_WORK) * unknowns },
-    { &x->scratch[0], n },
-    { &x->scratch[1], n },
-    { &x->scratch[2], n },
-    { &x->dq, n },
-    { &x->dv, n },
-    { &x->null_space, (unknowns + 1) * (unknowns + 1) },
-  };
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  x->solution = pw_arena_alloc (&x->arena, 2 * n * sizeof *x->solution);
-  x->hold = pw_arena_alloc (&x->arena, (holds + n) * sizeof *x->hold);
-  if (!x->memory || !x->solution || !x->hold) return PW_RESOURCE;
+  x->memory = PW_ALLOC_ARRAYS (PW_ARRAY (x->symmetry, rates * rates), PW_ARRAY (x->free_symmetry, rates * rates),
+                               PW_ARRAY (x->norm, m), PW_ARRAY (x->start, 2 * n), PW_ARRAY (x->q, n + 3),
+                               PW_ARRAY (x->v, n + 3), PW_ARRAY (x->rates, rates), PW_ARRAY (x->combined, rates),
+                               PW_ARRAY (x->u, unknowns + 1), PW_ARRAY (x->F, n * rates + (1 + STEADY_WORK) * unknowns),
+                               PW_ARRAY (x->scratch[0], n), PW_ARRAY (x->scratch[1], n), PW_ARRAY (x->scratch[2], n),
+                               PW_ARRAY (x->dq, n), PW_ARRAY (x->dv, n),
+                               PW_ARRAY (x->null_space, (unknowns + 1) * (unknowns + 1)), PW_ARRAY (x->solution, 2 * n),
+                               PW_ARRAY (x->hold, holds + n));
+  if (x->memory == NULL) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->settings.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->solution[j].state = j;
   return PW_OK;
@@ -578,7 +565,6 @@ void pw_steady_close (pw_steady *x) {
   for (int i = 0; i < PW_STEADY_RECENT; i++) steady_close_system (&x->recent[i]);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
-  pw_arena_free (&x->arena);
   free (x->memory);
   free (x);
 }

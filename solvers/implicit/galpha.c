@@ -167,11 +167,10 @@ static int galpha_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
-  const pw_array array[] = {
-    { &d->v, n },  { &d->a, n },    { &d->row_factor, most }, { &d->column_factor, most }, { &d->w, n }, { &d->a1, n },
-    { &d->w1, n }, { &d->y, most }, { &d->z, most }
-  };
-  int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
+  d->common.memory = PW_ALLOC_ARRAYS (PW_ARRAY (d->v, n), PW_ARRAY (d->a, n), PW_ARRAY (d->row_factor, most),
+                                      PW_ARRAY (d->column_factor, most), PW_ARRAY (d->w, n), PW_ARRAY (d->a1, n),
+                                      PW_ARRAY (d->w1, n), PW_ARRAY (d->y, most), PW_ARRAY (d->z, most));
+  int status = pw_implicit_open (&d->common, r);
   pw_dae *x = &d->common.dae;
   if (status == PW_OK) {
     const double rho = pw_run_option (r, "rho"); /* order 2, least damping of low frequencies (Chung & Hulbert 1993) */

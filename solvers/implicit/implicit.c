@@ -2,8 +2,7 @@
 #include <stdlib.h>
 #include "implicit.h"
 
-int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count) {
-  x->memory = pw_alloc_arrays (array, count);
+int pw_implicit_open (pw_implicit *x, pw_run *r) {
   return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
 }
 

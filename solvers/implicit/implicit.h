@@ -20,8 +20,8 @@ typedef struct {
   char *memory;         /* of the method's arrays */
 } pw_implicit;
 
-/* Allocates the method's arrays, `count` of them, and opens x->dae: PW_OK or PW_RESOURCE. */
-int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
+/* Opens x->dae, after the method has allocated its arrays, x->memory: PW_OK or PW_RESOURCE. */
+int pw_implicit_open (pw_implicit *x, pw_run *r);
 
 /* Completes the opening with the Newton matrix of this size, of the pattern in x->dae.tangent.scatter, and a dense
  * output of this projection; if `status`, of the functions before, is not PW_OK, reports that memory is exhausted. */

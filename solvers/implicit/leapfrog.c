@@ -242,10 +242,11 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
-  const pw_array array[] = { { &d->u, n },      { &d->common.q1, n }, { &d->common.v1, n },   { &d->middle, n },
-                             { &d->dv, n },     { &d->f, n },         { &d->residual, rows }, { &d->mu, rows },
-                             { &d->eta, rows }, { &d->z, n + rows } };
-  int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
+  d->common.memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (d->u, n), PW_ARRAY (d->common.q1, n), PW_ARRAY (d->common.v1, n),
+                       PW_ARRAY (d->middle, n), PW_ARRAY (d->dv, n), PW_ARRAY (d->f, n), PW_ARRAY (d->residual, rows),
+                       PW_ARRAY (d->mu, rows), PW_ARRAY (d->eta, rows), PW_ARRAY (d->z, n + rows));
+  int status = pw_implicit_open (&d->common, r);
   pw_tangent *x = &d->common.dae.tangent;
   const int size = r->s->coords + x->rows;
   if (status == PW_OK) { /* the pattern of the matrix */

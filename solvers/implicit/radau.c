@@ -444,23 +444,18 @@ static int radau_restart (pw_run *r, pw_error *error) {
 
 static int radau_allocate (pw_run *r) {
   pw_method_data *d = r->data;
-  const size_t n = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &d->memory);) {
-    double **const unknowns[] = { &d->B,         &d->unit,       &d->tolerance,     &d->newton_tolerance,
-                                  &d->round_off, &d->row_factor, &d->column_factor, &d->Y,
-                                  &d->a_end,     &d->now.y,      &d->last.y,        &d->now.a,
-                                  &d->last.a };
-    for (size_t i = 0; i < sizeof unknowns / sizeof *unknowns; i++)
-      *unknowns[i] = pw_layout_alloc (&l, n, sizeof (double));
-    d->complex_x = pw_layout_alloc (&l, 2 * n, sizeof (double));
-    for (int k = 0; k < STAGES; k++) {
-      double **const stage[] = { &d->now.Z[k], &d->last.Z[k], &d->W[k], &d->F[k] };
-      for (int i = 0; i < 4; i++) *stage[i] = pw_layout_alloc (&l, n, sizeof (double));
-      d->now.ledger_change[k] = pw_layout_alloc (&l, (size_t)r->entries, sizeof (double));
-      d->last.ledger_change[k] = pw_layout_alloc (&l, (size_t)r->entries, sizeof (double));
-    }
-    double **const ledger[] = { &d->rate, &d->now.ledger, &d->last.ledger };
-    for (int i = 0; i < 3; i++) *ledger[i] = pw_layout_alloc (&l, (size_t)r->entries, sizeof (double));
+  const int n = d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
+  double *stage, *change;
+  d->memory = PW_ALLOC_ARRAYS (
+      PW_ARRAY (d->B, n), PW_ARRAY (d->unit, n), PW_ARRAY (d->tolerance, n), PW_ARRAY (d->newton_tolerance, n),
+      PW_ARRAY (d->round_off, n), PW_ARRAY (d->row_factor, n), PW_ARRAY (d->column_factor, n), PW_ARRAY (d->Y, n),
+      PW_ARRAY (d->a_end, n), PW_ARRAY (d->now.y, n), PW_ARRAY (d->last.y, n), PW_ARRAY (d->now.a, n),
+      PW_ARRAY (d->last.a, n), PW_ARRAY (d->complex_x, 2 * n), PW_ARRAY (stage, 4 * STAGES * n),
+      PW_ARRAY (change, 2 * STAGES * r->entries), PW_ARRAY (d->rate, r->entries), PW_ARRAY (d->now.ledger, r->entries),
+      PW_ARRAY (d->last.ledger, r->entries));
+  for (int k = 0; d->memory && k < STAGES; k++, stage += 4 * n, change += 2 * r->entries) {
+    d->now.Z[k] = stage, d->last.Z[k] = stage + n, d->W[k] = stage + 2 * n, d->F[k] = stage + 3 * n;
+    d->now.ledger_change[k] = change, d->last.ledger_change[k] = change + r->entries;
   }
   return d->memory ? PW_OK : PW_RESOURCE;
 }

@@ -705,9 +705,7 @@ int pw_block_join_chains (pw_block_ldl *l, pw_chain_between *between, pw_chain *
 
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
-  free (l->cursor);
-  free (l->target);
-  free (l->value);
+  free (l->numbers);
   free (l->pattern);
   free (l->memory);
   free (l);
@@ -717,11 +715,9 @@ void pw_block_close (pw_block_ldl *l) {
 static pw_block_ldl *order_allocate (const order_search *x) {
   size_t n = (size_t)x->nodes;
   pw_block_ldl *l = calloc (1, sizeof *l);
-  for (pw_layout lay = { 0 }; l && pw_layout_pass (&lay, &l->pattern);) {
-    l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
-    l->below = pw_layout_alloc (&lay, (size_t)x->first_below[n], sizeof *l->below);
-    l->column_of_node = pw_layout_alloc (&lay, n, sizeof *l->column_of_node);
-  }
+  if (l)
+    l->pattern = PW_ALLOC_ARRAYS (PW_ARRAY (l->column, n + 1), PW_ARRAY (l->below, x->first_below[n]),
+                                  PW_ARRAY (l->column_of_node, n));
   if (l == NULL || l->pattern == NULL) return free (l), NULL;
   l->nodes = x->nodes;
   memcpy (l->column_of_node, x->column, n * sizeof *l->column_of_node);
@@ -753,12 +749,10 @@ static pw_block_ldl *order_fill (order_search *x, int most, int *status) {
 /* In the natural order or, if that has less fill-in, minimum degree in rank 0; NULL if out of memory or L is too
  * large. */
 static pw_block_ldl *order_choose (order_search *x) {
-  int **const array[] = { &x->first, &x->order, &x->column, &x->first_below, &x->parent, &x->visited, &x->next };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
-    x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-      *array[i] = pw_layout_alloc (&l, (size_t)x->nodes + 1, sizeof (int));
-  }
+  const int n = x->nodes + 1;
+  x->memory = PW_ALLOC_ARRAYS (PW_ARRAY (x->list, 2 * x->pairs), PW_ARRAY (x->first, n), PW_ARRAY (x->order, n),
+                               PW_ARRAY (x->column, n), PW_ARRAY (x->first_below, n), PW_ARRAY (x->parent, n),
+                               PW_ARRAY (x->visited, n), PW_ARRAY (x->next, n));
   int status;
   if (x->memory == NULL) return NULL;
   order_list_neighbours (x, 0);
@@ -766,7 +760,7 @@ static pw_block_ldl *order_choose (order_search *x) {
   order_list_neighbours (x, PW_BLOCK_RANKS - 1);
   pw_block_ldl *minimum_degree = order_fill (x, INT_MAX / 2, &status);
   if (minimum_degree == NULL) return NULL;
-  for (int n = 0; n < x->nodes; n++) x->order[n] = n;
+  for (int i = 0; i < x->nodes; i++) x->order[i] = i;
   pw_block_ldl *natural = order_fill (x, minimum_degree->column[x->nodes].first_below, &status);
   if (status == PW_RETRY) return minimum_degree;
   pw_block_close (minimum_degree);
@@ -819,10 +813,9 @@ int pw_block_lay_out (pw_block_ldl *l) {
       longest = rows;
   }
   l->column[l->nodes].first_value = l->values = (int)at;
-  l->cursor = malloc ((2 * longest + 1) * sizeof *l->cursor);
-  l->target = malloc ((targets + 1) * sizeof *l->target);
-  l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);
-  if (l->cursor == NULL || l->target == NULL || l->value == NULL) return PW_RESOURCE;
+  l->numbers = PW_ALLOC_ARRAYS (PW_ARRAY (l->value, l->values), PW_ARRAY (l->target, targets),
+                                PW_ARRAY (l->cursor, 2 * longest));
+  if (l->numbers == NULL) return PW_RESOURCE;
   order_place_targets (l);
   return PW_OK;
 }

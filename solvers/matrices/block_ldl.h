@@ -102,9 +102,10 @@ typedef struct pw_block_ldl {
   pw_chain *chain;      /* chains + 1, by ascending columns, the last one a sentinel; their bodies have no block */
   double *chain_factor; /* factors of D in the chains' columns */
   int groups;
-  double least_pivot;     /* smallest pivot of the last factorisation over its diagonal entry before elimination */
-  int least_unknown;      /* index in y of its unknown; -1: there is none */
-  char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
+  double least_pivot; /* smallest pivot of the last factorisation over its diagonal entry before elimination */
+  int least_unknown;  /* index in y of its unknown; -1: there is none */
+  /* allocations: of column, below and column_of_node; of value, target and cursor; of groups and chains */
+  char *pattern, *numbers, *memory;
 } pw_block_ldl;
 
 typedef struct {

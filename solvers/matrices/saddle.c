@@ -110,6 +110,7 @@ typedef struct pw_component {
   double *x;          /* rows: scratch */
   double *A;          /* rows x cols: of unmatched rows Z', arbitrary in massless columns; scratch while matching */
   double least_pivot; /* the smallest pivot relative to its row, or norm of a row of Z' relative to its terms */
+  char *memory;
 } pw_component;
 
 /* The contribution of a node to a group. */
@@ -502,30 +503,22 @@ static void massless_add_rows (saddle_plan *p) {
 /* Allocates the components' arrays.  A component has at most as many groups as were counted with repetition, at most
  * those of the scene, and at most as many pivots as rows. */
 static int massless_lay_out (const saddle_plan *p) {
-  pw_saddle *saddle = p->saddle;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->component_memory);)
-    for (pw_component *c = saddle->component; c < saddle->component + saddle->components; c++) {
-      size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
-             cols = 3 * groups;
-      c->group = pw_layout_alloc (&l, groups, sizeof *c->group);
-      c->global = pw_layout_alloc (&l, cols, sizeof *c->global);
-      c->is_massless = pw_layout_alloc (&l, cols, 1);
-      c->squared_scale = pw_layout_alloc (&l, cols, sizeof *c->squared_scale);
-      c->massive_squared_scale = pw_layout_alloc (&l, cols, sizeof *c->massive_squared_scale);
-      c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
-      c->unknown = pw_layout_alloc (&l, rows, sizeof *c->unknown);
-      c->entry = pw_layout_alloc (&l, rows * rows, sizeof *c->entry);
-      c->block = pw_layout_alloc (&l, (size_t)c->groups, sizeof *c->block);
-      c->P = pw_layout_alloc (&l, rows * rows, sizeof *c->P);
-      c->A = pw_layout_alloc (&l, rows * cols, sizeof *c->A);
-      c->x = pw_layout_alloc (&l, rows, sizeof *c->x);
-      const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
-      if (l.base == NULL) continue;
-      for (size_t i = 0; i < rows; i++) c->row[i].source = from + i * groups;
-      for (size_t i = 0; i < rows * groups; i++) from[i] = massless_zeros;
-      c->rows = c->groups = 0;
-    }
-  return saddle->component_memory ? PW_OK : PW_RESOURCE;
+  const pw_saddle *saddle = p->saddle;
+  for (pw_component *c = saddle->component; c < saddle->component + saddle->components; c++) {
+    const int rows = c->rows, groups = c->groups < p->groups ? c->groups : p->groups, cols = 3 * groups;
+    const double **from;
+    c->memory = PW_ALLOC_ARRAYS (
+        PW_ARRAY (c->group, groups), PW_ARRAY (c->global, cols), PW_ARRAY (c->is_massless, cols),
+        PW_ARRAY (c->squared_scale, cols), PW_ARRAY (c->massive_squared_scale, cols), PW_ARRAY (c->row, rows),
+        PW_ARRAY (c->unknown, rows), PW_ARRAY (c->entry, (size_t)rows * (size_t)rows), PW_ARRAY (c->block, c->groups),
+        PW_ARRAY (c->P, (size_t)rows * (size_t)rows), PW_ARRAY (c->A, (size_t)rows * (size_t)cols),
+        PW_ARRAY (c->x, rows), PW_ARRAY (from, (size_t)rows * (size_t)groups));
+    if (c->memory == NULL) return PW_RESOURCE;
+    for (int i = 0; i < rows; i++) c->row[i].source = from + i * groups;
+    for (int i = 0; i < rows * groups; i++) from[i] = massless_zeros;
+    c->rows = c->groups = 0;
+  }
+  return PW_OK;
 }
 
 static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
@@ -872,14 +865,11 @@ static int condense_fill (const saddle_plan *plan, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, filled = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
   l->groups = plan->groups - plan->linked; /* bodies of chains have no block */
-  for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
-    l->group = pw_layout_alloc (&lay, (size_t)l->groups + 1, sizeof *l->group);
-    l->contribution = pw_layout_alloc (&lay, (size_t)(plan->contributions - 2 * plan->linked + 2 * uncondensed),
-                                       sizeof *l->contribution);
-    l->coupling = pw_layout_alloc (&lay, (size_t)(plan->pairs - plan->linked), sizeof *l->coupling);
-    l->chain = pw_layout_alloc (&lay, (size_t)plan->chains + 1, sizeof *l->chain);
-    l->chain_factor = pw_layout_alloc (&lay, 3 * (size_t)(plan->linked + plan->chains), sizeof *l->chain_factor);
-  }
+  l->memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (l->group, l->groups + 1),
+                       PW_ARRAY (l->contribution, plan->contributions - 2 * plan->linked + 2 * uncondensed),
+                       PW_ARRAY (l->coupling, plan->pairs - plan->linked), PW_ARRAY (l->chain, plan->chains + 1),
+                       PW_ARRAY (l->chain_factor, 3 * (plan->linked + plan->chains)));
   if (l->memory == NULL) return PW_RESOURCE;
   memcpy (l->chain, plan->chain, (size_t)plan->chains * sizeof *l->chain);
   l->chain[plan->chains] = (pw_chain){ .first_column = l->nodes + 1 };
@@ -1073,8 +1063,8 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
 
 void pw_saddle_close (pw_saddle *saddle) {
   if (saddle == NULL) return;
+  for (int c = 0; c < saddle->components && saddle->component; c++) free (saddle->component[c].memory);
   free (saddle->component);
-  free (saddle->component_memory);
   pw_block_close (saddle->block);
   pw_dense_close (saddle->dense);
   free (saddle->y);
@@ -1085,12 +1075,9 @@ void pw_saddle_close (pw_saddle *saddle) {
 static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
   pw_saddle *saddle = plan->saddle;
   size_t n = (size_t)saddle->s->coords;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->memory);) {
-    saddle->inverse_weight = pw_layout_alloc (&l, n + 3, sizeof *saddle->inverse_weight);
-    saddle->force = pw_layout_alloc (&l, n, sizeof *saddle->force);
-    saddle->inactive = pw_layout_alloc (&l, (size_t)saddle->rows, sizeof *saddle->inactive);
-    saddle->component_of_row = pw_layout_alloc (&l, (size_t)saddle->s->rows, sizeof *saddle->component_of_row);
-  }
+  saddle->memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (saddle->inverse_weight, n + 3), PW_ARRAY (saddle->force, n),
+                       PW_ARRAY (saddle->inactive, saddle->rows), PW_ARRAY (saddle->component_of_row, saddle->s->rows));
   if (saddle->memory == NULL) return PW_RESOURCE;
   for (size_t j = 0; j < n; j++) saddle->inverse_weight[j] = plan->weight[j] > 0 ? 1 / plan->weight[j] : 0;
   int status = massless_open (plan, error);

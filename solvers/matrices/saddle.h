@@ -31,7 +31,7 @@ typedef struct pw_saddle {
   int inactive_count;
   double pivot; /* smallest when last factorised: of S, the squared sine of the angle between a row and those before
                  * it; of massless coordinates, see massless_forward_all */
-  char *memory, *component_memory;
+  char *memory;
 } pw_saddle;
 
 /* rows: number of rows of J included (all, or the holonomic ones); of these only those with active[i] != 0 if active is

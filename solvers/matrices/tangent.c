@@ -14,15 +14,10 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
     for (int i = 0; i < 3; i++)
       if (columns * widths[i] > block) block = columns * widths[i];
   }
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
-    x->row_index = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row_index);
-    x->row = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row);
-    x->lambda = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->lambda);
-    x->D = pw_layout_alloc (&l, (size_t)s->coords, sizeof *x->D);
-    x->block = pw_layout_alloc (&l, block, sizeof *x->block);
-    x->direction = pw_layout_alloc (&l, direction, sizeof *x->direction);
-    x->gradient = pw_layout_alloc (&l, s->feedback ? 4 * (size_t)s->reads : 0, sizeof *x->gradient);
-  }
+  x->memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (x->row_index, s->rows), PW_ARRAY (x->row, s->rows), PW_ARRAY (x->lambda, s->rows),
+                       PW_ARRAY (x->D, s->coords), PW_ARRAY (x->block, block), PW_ARRAY (x->direction, direction),
+                       PW_ARRAY (x->gradient, s->feedback ? 4 * (size_t)s->reads : 0));
   if (x->memory == NULL) return PW_RESOURCE;
   for (int i = 0; i < s->sources; i++) r->w->source[i].gradient = r->w->source[i].reads > 0;
   if (s->reads > 0) (void)pw_update_kinematics (r->w, r->t, r->q, r->v); /* with gradients from now on */
@@ -317,8 +312,8 @@ int pw_dae_open (pw_dae *x, pw_run *r) {
   *x = (pw_dae){ .integrates_multipliers = kind == PW_SI1, .n = s->coords };
   x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX3 || kind == PW_RATTLE;
   x->enforces_velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
-  const pw_array array[] = { { &x->reaction, n + 3 }, { &x->force, n + 3 }, { &x->residual, m }, { &x->scratch, m } };
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->memory = PW_ALLOC_ARRAYS (PW_ARRAY (x->reaction, n + 3), PW_ARRAY (x->force, n + 3), PW_ARRAY (x->residual, m),
+                               PW_ARRAY (x->scratch, m));
   if (x->memory == NULL || pw_tangent_open (&x->tangent, r) != PW_OK) return PW_RESOURCE;
   x->rows = x->tangent.rows;
   x->mu_count = x->enforces_positions && x->enforces_velocities ? x->tangent.holonomic : 0;

@@ -48,15 +48,9 @@ static int moreau_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   const size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
-  const pw_array array[] = { { &d->rate, (size_t)r->entries },
-                             { &d->q, n },
-                             { &d->v, n },
-                             { &d->a, n },
-                             { &d->f, n },
-                             { &d->da, n },
-                             { &d->lambda, rows },
-                             { &d->mu, rows } };
-  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  d->memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (d->rate, r->entries), PW_ARRAY (d->q, n), PW_ARRAY (d->v, n), PW_ARRAY (d->a, n),
+                       PW_ARRAY (d->f, n), PW_ARRAY (d->da, n), PW_ARRAY (d->lambda, rows), PW_ARRAY (d->mu, rows));
   if (d->memory == NULL) return pw_fail_memory (r->s, error);
   int status = pw_impulses_open (r, error);
   if (status == PW_OK) status = pw_dense_output_open (&d->last, r, PW_DENSE_POSITIONS_AND_VELOCITIES, error);

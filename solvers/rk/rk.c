@@ -83,12 +83,9 @@ static int nullspace_open (rk_nullspace *b, pw_run *r, pw_error *error) {
                     "this scene has %d; use %s+projection",
                     s->model, NULLSPACE_MOST, b->rows, r->method->name);
   const size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
-  const pw_array array[] = {
-    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
-  };
-  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  b->active_index = malloc ((all + 1) * sizeof *b->active_index);
-  if (b->memory == NULL || b->active_index == NULL) return pw_fail_memory (s, error);
+  b->memory = PW_ALLOC_ARRAYS (PW_ARRAY (b->W_inv_J0T, n * m), PW_ARRAY (b->K, m * m), PW_ARRAY (b->mu, m),
+                               PW_ARRAY (b->eta, all), PW_ARRAY (b->v, n + 3), PW_ARRAY (b->active_index, all));
+  if (b->memory == NULL) return pw_fail_memory (s, error);
   for (int i = 0, count = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : count++;
   return PW_OK;
 }
@@ -851,20 +848,24 @@ static int rk_allocate (pw_method_data *d, const pw_run *r) {
   enum { ONCE = 8, MOST = ONCE + 3 * PW_RK_STAGES + 3 * RK_NODES }; /* arrays that exist once, not for each stage */
   size_t n = (size_t)r->s->coords + 3, state = pw_state_length (r->s), entries = (size_t)r->entries, count = ONCE;
   int stages = d->tableau->stages;
-  pw_array array[MOST] = {
-    { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
-    { &d->last.rate, entries }, { &d->second.q, state }, { &d->second.ledger, entries }, { &d->second.rate, entries }
-  };
+  pw_array array[MOST] = { PW_ARRAY (d->q, state),
+                           PW_ARRAY (d->weight, 2 * n),
+                           PW_ARRAY (d->last.q, state),
+                           PW_ARRAY (d->last.ledger, entries),
+                           PW_ARRAY (d->last.rate, entries),
+                           PW_ARRAY (d->second.q, state),
+                           PW_ARRAY (d->second.ledger, entries),
+                           PW_ARRAY (d->second.rate, entries) };
   for (int i = 1; i <= stages; i++) { /* stage 0 has r->v, r->a and r->rate */
-    array[count++] = (pw_array){ &d->stage_rate[i], entries };
+    array[count++] = (pw_array)PW_ARRAY (d->stage_rate[i], entries);
     if (i == stages) break; /* velocities and accelerations of the new state are in d->v, d->a */
-    array[count++] = (pw_array){ &d->stage_v[i], n };
-    array[count++] = (pw_array){ &d->stage_a[i], n };
+    array[count++] = (pw_array)PW_ARRAY (d->stage_v[i], n);
+    array[count++] = (pw_array)PW_ARRAY (d->stage_a[i], n);
   }
   for (pw_step_start *x = d->node; x < d->node + RK_NODES && !r->fixed_steps; x++) {
-    array[count++] = (pw_array){ &x->q, state };
-    array[count++] = (pw_array){ &x->ledger, entries };
-    array[count++] = (pw_array){ &x->rate, entries };
+    array[count++] = (pw_array)PW_ARRAY (x->q, state);
+    array[count++] = (pw_array)PW_ARRAY (x->ledger, entries);
+    array[count++] = (pw_array)PW_ARRAY (x->rate, entries);
   }
   d->memory = pw_alloc_arrays (array, count);
   if (d->memory == NULL) return PW_RESOURCE;
@@ -899,7 +900,6 @@ void pw_rk_close (pw_run *r) {
   rk_point (own, (size_t)r->s->coords + 3, &r->q, &r->v, &r->a, &r->lambda);
   pw_projector_close (&r->data->projector);
   free (r->data->nullspace.memory);
-  free (r->data->nullspace.active_index);
   free (r->data->memory);
   free (r->data);
 }

@@ -36,36 +36,23 @@ static int events_allocate (pw_run *r) {
   const size_t n = (size_t)s->limited, rows = (size_t)s->rows, coords = (size_t)s->coords + 3;
   pw_events *x = r->events = pw_arena_alloc (&r->arena, sizeof *x);
   if (x == NULL) return PW_RESOURCE;
-  double **const number[] = { &x->force_unit, &x->unit, &x->u,     &x->u_before,  &x->impulse,
-                              &x->offset,     &x->d.b,  &x->d.x,   &x->d.lo,      &x->d.hi,
-                              &x->direction,  &x->bias, &x->reach, &x->d.towards, &x->mean };
-  double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
-  signed char **const mode[] = { &x->mode, &x->before, &x->d.trial };
-  unsigned char **const flag[] = { &x->armed,     &x->triggered, &x->rests,   &x->struck,     &x->still,
-                                   &x->d.blocked, &x->spare,     &x->d.fixed, &x->d.redundant };
-  int **const index[] = { &x->row, &x->d.list, &x->d.held, &x->partner, &x->place, &x->d.normal };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
-    x->d.limit = x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
-    for (size_t i = 0; i < sizeof number / sizeof *number; i++) *number[i] = pw_layout_alloc (&l, n, sizeof (double));
-    for (int i = 0; i < 4; i++) *function[i] = pw_layout_alloc (&l, 2 * n, sizeof (double));
-    for (int i = 0; i < 3; i++) *mode[i] = pw_layout_alloc (&l, n, 1);
-    for (size_t i = 0; i < sizeof flag / sizeof *flag; i++) *flag[i] = pw_layout_alloc (&l, n, 1);
-    for (size_t i = 0; i < sizeof index / sizeof *index; i++) *index[i] = pw_layout_alloc (&l, n, sizeof (int));
-    r->coupling = pw_layout_alloc (&l, n, sizeof *r->coupling);
-    r->coupling_memory = pw_layout_alloc (&l, 2 * coords + rows + n * (n + 1), sizeof (double));
-    x->enforced = pw_layout_alloc (&l, rows, 1);
-    x->other = pw_layout_alloc (&l, rows, 1);
-    x->d.choice = pw_layout_alloc (&l, 2 * n, sizeof *x->d.choice);
-    x->d.A = pw_layout_alloc (&l, n * n, sizeof *x->d.A);
-    x->d.factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->d.factor);
-    x->f = pw_layout_alloc (&l, coords, sizeof *x->f);
-    x->a = pw_layout_alloc (&l, coords, sizeof *x->a);
-    x->gamma = pw_layout_alloc (&l, rows, sizeof *x->gamma);
-    x->lambda = pw_layout_alloc (&l, 2 * rows, sizeof *x->lambda);
-    x->memory = pw_layout_alloc (&l, 2 * n * (PW_CROSSING_DEPTH + 2), sizeof *x->memory);
-    r->reaction = pw_layout_alloc (&l, rows, sizeof *r->reaction);
-    r->given = pw_layout_alloc (&l, rows, sizeof *r->given);
-  }
+  r->events_memory = PW_ALLOC_ARRAYS (
+      PW_ARRAY (x->limit, n), PW_ARRAY (x->force_unit, n), PW_ARRAY (x->unit, n), PW_ARRAY (x->u, n),
+      PW_ARRAY (x->u_before, n), PW_ARRAY (x->impulse, n), PW_ARRAY (x->offset, n), PW_ARRAY (x->d.b, n),
+      PW_ARRAY (x->d.x, n), PW_ARRAY (x->d.lo, n), PW_ARRAY (x->d.hi, n), PW_ARRAY (x->direction, n),
+      PW_ARRAY (x->bias, n), PW_ARRAY (x->reach, n), PW_ARRAY (x->d.towards, n), PW_ARRAY (x->mean, n),
+      PW_ARRAY (x->start, 2 * n), PW_ARRAY (x->end, 2 * n), PW_ARRAY (x->now, 2 * n), PW_ARRAY (x->previous, 2 * n),
+      PW_ARRAY (x->mode, n), PW_ARRAY (x->before, n), PW_ARRAY (x->d.trial, n), PW_ARRAY (x->armed, n),
+      PW_ARRAY (x->triggered, n), PW_ARRAY (x->rests, n), PW_ARRAY (x->struck, n), PW_ARRAY (x->still, n),
+      PW_ARRAY (x->d.blocked, n), PW_ARRAY (x->spare, n), PW_ARRAY (x->d.fixed, n), PW_ARRAY (x->d.redundant, n),
+      PW_ARRAY (x->row, n), PW_ARRAY (x->d.list, n), PW_ARRAY (x->d.held, n), PW_ARRAY (x->partner, n),
+      PW_ARRAY (x->place, n), PW_ARRAY (x->d.normal, n), PW_ARRAY (r->coupling, n),
+      PW_ARRAY (r->coupling_memory, 2 * coords + rows + n * (n + 1)), PW_ARRAY (x->enforced, rows),
+      PW_ARRAY (x->other, rows), PW_ARRAY (x->d.choice, 2 * n), PW_ARRAY (x->d.A, n * n),
+      PW_ARRAY (x->d.factor, n * (n + 1)), PW_ARRAY (x->f, coords), PW_ARRAY (x->a, coords), PW_ARRAY (x->gamma, rows),
+      PW_ARRAY (x->lambda, 2 * rows), PW_ARRAY (x->memory, 2 * n * (PW_CROSSING_DEPTH + 2)),
+      PW_ARRAY (r->reaction, rows), PW_ARRAY (r->given, rows));
+  x->d.limit = x->limit;
   return r->events_memory ? PW_OK : PW_RESOURCE;
 }
 

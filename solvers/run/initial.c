@@ -570,13 +570,8 @@ static int initial_select (initial_search *x) {
   initial_factors f = { 0 };
   char *memory;
   int status = PW_OK;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);) {
-    f.column = pw_layout_alloc (&l, rows, sizeof *f.column);
-    f.norm = pw_layout_alloc (&l, rows, sizeof *f.norm);
-    f.first = pw_layout_alloc (&l, rows + 1, sizeof *f.first);
-    f.pivot_of = pw_layout_alloc (&l, rows, sizeof *f.pivot_of);
-    f.pivot_row = pw_layout_alloc (&l, rows, sizeof *f.pivot_row);
-  }
+  memory = PW_ALLOC_ARRAYS (PW_ARRAY (f.column, rows), PW_ARRAY (f.norm, rows), PW_ARRAY (f.first, rows + 1),
+                            PW_ARRAY (f.pivot_of, rows), PW_ARRAY (f.pivot_row, rows));
   if (memory == NULL) return PW_RESOURCE;
   for (int j = 0; j < n; j++) x->weight[j] = 1, x->basis[j] = 0;
   initial_fill (x, 0);
@@ -704,17 +699,11 @@ static int initial_open (initial_search *x, pw_run *r, initial_level level, cons
   x->rows = level == INITIAL_VELOCITIES ? s->rows : s->holonomic;
   x->value = level == INITIAL_VELOCITIES ? r->v : r->q;
   x->given = level == INITIAL_VELOCITIES ? r->v_given : r->q_given;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
-    double **const array[] = { &x->weight, &x->target, &x->from, &x->last, &x->nearest, &x->best };
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = pw_layout_alloc (&l, n, sizeof (double));
-    x->step = pw_layout_alloc (&l, n + rows, sizeof (double));
-    x->residual = pw_layout_alloc (&l, rows, sizeof (double));
-    x->unit = pw_layout_alloc (&l, rows, sizeof (double));
-    x->diagonal = pw_layout_alloc (&l, rows, sizeof (double));
-    x->list = pw_layout_alloc (&l, n, sizeof (int));
-    unsigned char **const flags[] = { &x->importance, &x->described, &x->basis, &x->unused };
-    for (size_t i = 0; i < sizeof flags / sizeof *flags; i++) *flags[i] = pw_layout_alloc (&l, n, 1);
-  }
+  x->memory = PW_ALLOC_ARRAYS (PW_ARRAY (x->weight, n), PW_ARRAY (x->target, n), PW_ARRAY (x->from, n),
+                               PW_ARRAY (x->last, n), PW_ARRAY (x->nearest, n), PW_ARRAY (x->best, n),
+                               PW_ARRAY (x->step, n + rows), PW_ARRAY (x->residual, rows), PW_ARRAY (x->unit, rows),
+                               PW_ARRAY (x->diagonal, rows), PW_ARRAY (x->list, n), PW_ARRAY (x->importance, n),
+                               PW_ARRAY (x->described, n), PW_ARRAY (x->basis, n), PW_ARRAY (x->unused, n));
   if (x->memory == NULL) return PW_RESOURCE;
   initial_rank (x, origin);
   pw_scatter_begin_record (&x->map);

@@ -37,8 +37,8 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
   d->length = n > rows ? n : rows;
-  const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * d->length } };
-  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  d->memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (d->a, n), PW_ARRAY (d->lambda, rows), PW_ARRAY (d->array, (size_t)arrays * d->length));
   if (d->memory == NULL) return pw_fail_memory (r->s, error);
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   pw_dense_projection projection = d->projects ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_UNPROJECTED;
@@ -114,8 +114,8 @@ int pw_step_at (pw_run *r, double t, pw_error *error) {
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error) {
   size_t state = pw_state_length (r->s), entries = (size_t)r->entries;
   *b = (pw_dense_output){ .start.t = r->t, .projection = projection };
-  const pw_array array[] = { { &b->start.q, state }, { &b->start.ledger, entries }, { &b->start.rate, entries } };
-  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  b->memory = PW_ALLOC_ARRAYS (PW_ARRAY (b->start.q, state), PW_ARRAY (b->start.ledger, entries),
+                               PW_ARRAY (b->start.rate, entries));
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
   return projection == PW_DENSE_UNPROJECTED ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
 }

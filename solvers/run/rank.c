@@ -75,18 +75,10 @@ typedef struct {
 static int rank_open (rank_basis *b, const pw_system *s) {
   size_t rows = (size_t)s->rows, columns = (size_t)s->coords + 1;
   *b = (rank_basis){ .coords = s->coords };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &b->memory);) {
-    b->rows = pw_layout_alloc (&l, rows * (size_t)s->coords, sizeof *b->rows);
-    b->norm = pw_layout_alloc (&l, rows, sizeof *b->norm);
-    b->kept = pw_layout_alloc (&l, rows, sizeof *b->kept);
-    b->active = pw_layout_alloc (&l, rows, 1);
-    b->value = pw_layout_alloc (&l, s->jacobian, sizeof *b->value);
-    b->column = pw_layout_alloc (&l, s->jacobian, sizeof *b->column);
-    b->first = pw_layout_alloc (&l, rows + 1, sizeof *b->first);
-    b->count = pw_layout_alloc (&l, columns, sizeof *b->count);
-    b->sum = pw_layout_alloc (&l, columns, sizeof *b->sum);
-    b->queue = pw_layout_alloc (&l, columns, sizeof *b->queue);
-  }
+  b->memory = PW_ALLOC_ARRAYS (PW_ARRAY (b->rows, rows * (size_t)s->coords), PW_ARRAY (b->norm, rows),
+                               PW_ARRAY (b->kept, rows), PW_ARRAY (b->active, rows), PW_ARRAY (b->value, s->jacobian),
+                               PW_ARRAY (b->column, s->jacobian), PW_ARRAY (b->first, rows + 1),
+                               PW_ARRAY (b->count, columns), PW_ARRAY (b->sum, columns), PW_ARRAY (b->queue, columns));
   return b->memory ? PW_OK : PW_RESOURCE;
 }
 

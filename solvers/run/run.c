@@ -83,7 +83,6 @@ void pw_run_close (pw_run *r) {
   free (r->event);
   free (r->events_memory);
   free (r->memory);
-  free (r->origin);
   pw_arena_free (&r->arena);
   free (r);
 }

@@ -39,24 +39,14 @@ static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)r->entries;
   size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, states = s->saturates ? 2 * n : 0;
-  const pw_array array[] = { { &r->q, state },
-                             { &r->ledger, entries },
-                             { &r->rate, entries },
-                             { &r->q_at, state },
-                             { &r->ledger_at, entries },
-                             { &r->scratch, scratch },
-                             { &r->q_given, 2 * n },
-                             { &r->given_before, 2 * n },
-                             { &r->atol, 2 * n },
-                             { &r->tolerance_bound, 2 * n },
-                             { &r->matrix_state, states },
-                             { &r->matrix_range, states },
-                             { &r->watchdog.previous_q, 2 * n },
-                             { &r->integrand_size, (size_t)r->settings.integrals },
-                             { &r->integrand_state, 2 * n } };
-  r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  r->origin = malloc (2 * n);
-  if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
+  r->memory = PW_ALLOC_ARRAYS (
+      PW_ARRAY (r->q, state), PW_ARRAY (r->ledger, entries), PW_ARRAY (r->rate, entries), PW_ARRAY (r->q_at, state),
+      PW_ARRAY (r->ledger_at, entries), PW_ARRAY (r->scratch, scratch), PW_ARRAY (r->q_given, 2 * n),
+      PW_ARRAY (r->given_before, 2 * n), PW_ARRAY (r->atol, 2 * n), PW_ARRAY (r->tolerance_bound, 2 * n),
+      PW_ARRAY (r->matrix_state, states), PW_ARRAY (r->matrix_range, states), PW_ARRAY (r->watchdog.previous_q, 2 * n),
+      PW_ARRAY (r->integrand_size, r->settings.integrals), PW_ARRAY (r->integrand_state, 2 * n),
+      PW_ARRAY (r->origin, 2 * n));
+  if (r->memory == NULL) return PW_RESOURCE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_given = r->q_given + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;

@@ -502,14 +502,9 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
   const size_t n = pw_state_length (r->s), rows = (size_t)r->s->rows;
   dead_walk walk = { .r = r };
   if (watch->saddle == NULL || r->saddle == NULL || r->s->rheonomic == 0 || r->w->failed) return PW_OK;
-  const pw_array array[] = { { &walk.state, n },
-                             { &walk.next, n },
-                             { &walk.start, n },
-                             { &walk.row_length, rows },
-                             { &walk.eta, rows },
-                             { &walk.mu, rows },
-                             { &walk.x, (size_t)r->s->coords + 3 } };
-  char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  char *memory = PW_ALLOC_ARRAYS (PW_ARRAY (walk.state, n), PW_ARRAY (walk.next, n), PW_ARRAY (walk.start, n),
+                                  PW_ARRAY (walk.row_length, rows), PW_ARRAY (walk.eta, rows), PW_ARRAY (walk.mu, rows),
+                                  PW_ARRAY (walk.x, r->s->coords + 3));
   if (memory == NULL) return PW_OK;
   const pw_statistics statistics = r->statistics;
   const pw_residuals residuals = r->residuals;

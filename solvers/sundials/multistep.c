@@ -263,9 +263,8 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
   int status = d->projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
-  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
-                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
-  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  d->memory = PW_ALLOC_ARRAYS (PW_ARRAY (d->q, n), PW_ARRAY (d->v, n), PW_ARRAY (d->a, n), PW_ARRAY (d->error, 2 * n),
+                               PW_ARRAY (d->lambda, rows), PW_ARRAY (d->newton.right, n + rows));
   d->evaluated = 1;
   if (d->memory == NULL || pw_sun_open (&d->sun, r, 2 * d->n, multistep_power) != PW_OK ||
       multistep_open_solver (d, formula) != PW_OK)

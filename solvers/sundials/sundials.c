@@ -79,12 +79,12 @@ void pw_sun_restart (pw_sun *x) {
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns, pw_rates_at *rates) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
   const size_t entries = (size_t)r->entries;
-  pw_array array[PW_SUN_POINTS + 4] = {
-    { &x->ledger0, entries }, { &x->integral, entries }, { &x->finer, entries }, { &x->node, entries }
-  };
-  for (int i = 0; i < PW_SUN_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
+  double *rate;
   x->run = r, x->rates = rates;
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->memory =
+      PW_ALLOC_ARRAYS (PW_ARRAY (x->ledger0, entries), PW_ARRAY (x->integral, entries), PW_ARRAY (x->finer, entries),
+                       PW_ARRAY (x->node, entries), PW_ARRAY (rate, PW_SUN_POINTS * entries));
+  for (int i = 0; i < PW_SUN_POINTS; i++) x->rate[i] = rate + i * r->entries;
   if (x->memory == NULL || pw_check_memory (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
       SUNContext_Create (NULL, &x->context) != 0)
     return PW_RESOURCE;

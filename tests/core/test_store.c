@@ -61,29 +61,17 @@ TEST (arena) {
   assert_null (arena.chunk);
 }
 
-/* The same calls, made twice, give the size and then the addresses. */
-TEST (layout) {
-  _Alignas(max_align_t) char room[256];
-  pw_layout size = { NULL, 0 }, place = { room, 0 };
-  assert_null (pw_layout_alloc (&size, 3, 5));
-  assert_null (pw_layout_alloc (&size, 0, 8));
-  assert_null (pw_layout_alloc (&size, 2, sizeof (double)));
-  char *a = pw_layout_alloc (&place, 3, 5), *b = pw_layout_alloc (&place, 0, 8),
-       *c = pw_layout_alloc (&place, 2, sizeof (double));
-  assert_true (a == room && b >= a + 15 && c >= b && (uintptr_t)c % sizeof (double) == 0);
-  assert_true (place.used == size.used && c + 2 * sizeof (double) <= room + size.used);
-}
-
-/* Two passes, also for an array without elements. */
-TEST (layout_pass) {
+/* One allocation: zeros, aligned, one array after the other, also those without elements. */
+TEST (arrays) {
   for (size_t count = 0; count < 3; count++) {
     double *a = NULL;
-    char *memory = NULL;
-    int passes = 0;
-    for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory); passes++) a = pw_layout_alloc (&l, count, sizeof *a);
-    assert_int_equal (passes, 2);
-    assert_true (memory && (char *)a == memory);
+    char *b = NULL;
+    int *c = NULL;
+    char *memory = PW_ALLOC_ARRAYS (PW_ARRAY (a, count), PW_ARRAY (b, 15), PW_ARRAY (c, 2));
+    assert_true (memory && (char *)a == memory && b >= (char *)(a + count) && (char *)c >= b + 15);
+    assert_int_equal ((uintptr_t)b % 16 + (uintptr_t)c % 16, 0);
     for (size_t i = 0; i < count; i++) assert_true (a[i] == 0);
+    assert_true (b[14] == 0 && c[1] == 0);
     free (memory);
   }
 }
