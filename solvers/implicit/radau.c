@@ -299,8 +299,8 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;
   if (size == 0) return PW_CONVERGED;
-  if (done == 0) { /* where forces saturate, the first correction may be small far from the solution (run.c) */
-    if (fixed || r->s->saturates) return PW_ITERATE;
+  if (done == 0) { /* where forces saturate or turn, the first correction may be small far from the solution (run.c) */
+    if (fixed || r->s->saturates || r->update_given) return PW_ITERATE;
     d->remaining = pow (fmax (d->remaining, DBL_EPSILON), 0.8);
     return d->remaining * size <= 1 ? PW_CONVERGED : PW_ITERATE;
   }

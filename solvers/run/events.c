@@ -371,8 +371,9 @@ void pw_events_forget (pw_run *r) {
 
 int pw_events_advance (pw_run *r, double t_end, pw_error *error) {
   int status = events_prepare (r, error);
-  const double t0 = r->t, longest = r->fixed_steps ? INFINITY : r->events->longest;
-  if (status == PW_OK) pw_modes_begin_step (r);
+  const double t0 = r->t;
+  double longest = r->fixed_steps ? INFINITY : r->events->longest;
+  if (status == PW_OK) longest = fmin (longest, pw_modes_begin_step (r));
   if (status == PW_OK) status = r->method->advance (r, fmin (t_end, t0 + longest), error);
   return status == PW_OK ? events_follow (r, t0, error) : status;
 }

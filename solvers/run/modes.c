@@ -19,7 +19,10 @@
 /* By which a limit that is reached is narrowed: the multiplier of the decision, of a projected state, differs from that
  * of the sample by round-off, about 1e-12 of the limit, which must not undo the event. */
 #define MODES_TIGHTER 1e-10
-enum { MODES_IMPACTS = 10 }; /* most at one instant, after which all their equations hold */
+#define CIRCLE_LAG 5e-4       /* of the direction of a circle (circle_longest) */
+#define CIRCLE_FIRST 1e-6     /* [T] first step after an event: u leaves 0 by more than round-off */
+enum { CIRCLE_PARTS = 1024 }; /* into which a step is divided at most where that direction turns */
+enum { MODES_IMPACTS = 10 };  /* most at one instant, after which all their equations hold */
 
 /* ---- Modes of the run ---- */
 
@@ -124,11 +127,12 @@ static double circle_direction (const pw_run *r, int i, double n[2], double by_u
   return hypot (u0, u1);
 }
 
-/* Sets e0 and, for this |u|, e.  A L: an upper bound, of the masses without other constraints. */
-static void circle_set_bias (pw_run *r, int i, double speed) {
+/* A L of the circle whose first equation is i, where J is evaluated: an upper bound, of the masses without other
+ * constraints. */
+static double circle_rate (pw_run *r, int i) {
   pw_events *x = r->events;
   double A = 0;
-  for (int row = x->row[i]; row < x->row[i] + 2 && r->fixed_steps; row++) {
+  for (int row = x->row[i]; row < x->row[i] + 2; row++) {
     memset (x->gamma, 0, (size_t)r->s->rows * sizeof *x->gamma);
     memset (x->f, 0, ((size_t)r->s->coords + 3) * sizeof *x->f);
     x->gamma[row] = 1;
@@ -136,19 +140,49 @@ static void circle_set_bias (pw_run *r, int i, double speed) {
     for (int j = 0; j < r->s->coords; j++)
       if (r->s->mass[j] > 0) A += x->f[j] * x->f[j] / r->s->mass[j];
   }
-  x->reach[i] = r->fixed_steps ? r->settings.step * A * x->limit[i].sliding[1] : sqrt (r->settings.rtol) * x->unit[i];
-  x->bias[i] = fmax (0, x->reach[i] - speed / 4);
+  return A * x->limit[i].sliding[1];
 }
 
-void pw_modes_begin_step (pw_run *r) {
+/* The largest e0, with this A L. */
+static double circle_reach (const pw_run *r, int i, double rate) {
+  return r->fixed_steps ? r->settings.step * rate : sqrt (r->settings.rtol) * r->events->unit[i];
+}
+
+/* The longest step that follows the direction of a circle that slides, with this A L.  |u| does not fall below half.
+ * Where it is small, but not round-off, e is 0 or the lag of d behind n, of the rate w, which is about w A L h^2 / |u|,
+ * below CIRCLE_LAG.  There fixed steps begin short after an event, and double. */
+static double circle_longest (pw_run *r, int i, double rate) {
   pw_events *x = r->events;
+  const double h = circle_reach (r, i, rate) / rate, last = r->t - x->previous_t, T = r->w->scale.time;
+  const double u[2] = { circle_speed (r->w, x->row[i]), circle_speed (r->w, x->row[i + 1]) }, size = hypot (u[0], u[1]);
+  const int near = size<4 * h * rate, moves = size> PW_MODES_SMALL * x->unit[i];
+  double longest = INFINITY, a[2], shortest = near ? h / CIRCLE_PARTS : h;
+  pw_mul_J (r->w, r->a, x->lambda);
+  pw_evaluate_gamma (r->w, x->gamma);
+  for (int m = 0; m < 2; m++) a[m] = x->lambda[x->row[i + m]] - x->gamma[x->row[i + m]];
+  const double along = u[0] * a[0] + u[1] * a[1], turn = fabs (u[0] * a[1] - u[1] * a[0]);
+  if (near && r->fixed_steps) longest = isnan (last) ? CIRCLE_FIRST * T : 2 * last;
+  if (near && moves)
+    longest = fmin (longest, fmax (size / (4 * rate), size * sqrt (CIRCLE_LAG * size / (rate * turn))));
+  if (moves && along < 0) longest = fmin (longest, -size * size / (2 * along));
+  longest = fmax (longest, shortest);
+  return longest < h || !near ? longest : INFINITY;
+}
+
+double pw_modes_begin_step (pw_run *r) {
+  pw_events *x = r->events;
+  double longest = INFINITY;
+  for (int i = 0; i < x->count; i++)
+    if (x->limit[i].circle == 1 && x->mode[i]) longest = fmin (longest, circle_longest (r, i, circle_rate (r, i)));
   for (int i = 0; i < x->count; i++) {
     double n[2], by_u[4];
     if (x->limit[i].circle != 1 || x->mode[i] == 0) continue;
-    const double speed = circle_direction (r, i, n, by_u);
+    const double rate = circle_rate (r, i), speed = circle_direction (r, i, n, by_u);
     x->direction[i] = n[0], x->direction[i + 1] = n[1];
-    circle_set_bias (r, i, speed);
+    x->reach[i] = fmin (circle_reach (r, i, rate), longest * rate);
+    x->bias[i] = fmax (0, x->reach[i] - speed / 4);
   }
+  return longest;
 }
 
 /* pw_run.update_given */
@@ -485,7 +519,7 @@ static int decide_modes (pw_run *r, pw_error *error) {
     x->still[i] = (unsigned char)pw_decision_rests (&x->d, k);
     x->spare[i] = x->d.redundant[k] && !apart;
     x->direction[i] = x->d.towards[k];
-    if (x->limit[i].circle == 1) circle_set_bias (r, i, 0);
+    if (x->limit[i].circle == 1) x->bias[i] = x->reach[i] = circle_reach (r, i, circle_rate (r, i));
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     const int i = x->d.list[k], circle = x->limit[i].circle;

@@ -80,8 +80,9 @@ void pw_modes_u (pw_run *r, const double *v, int g, double *u);
 /* Makes the modes those of the run: r->enforced, and the given multipliers of the other equations. */
 void pw_modes_apply (pw_run *r);
 
-/* Before a step: the direction of the forces on circles, from the state reached. */
-void pw_modes_begin_step (pw_run *r);
+/* Before a step: the direction of the forces on circles, from the state reached.  Returns the longest step in which
+ * fixed steps follow it. */
+double pw_modes_begin_step (pw_run *r);
 
 /* ---- Decisions at an instant ---- */
 

@@ -279,8 +279,36 @@ TEST (circle_orders) {
       for (int n = 0; n < 2; n++)
         error[n] = events_circle (i, method[k], &(pw_settings){ .step = n ? 5e-4 : 2e-3 }, 1e-3, "no bound");
       const double order = log (error[0] / error[1]) / log (4);
-      if (!(order > 1.7)) print_error ("%s, %s: order %g\n", method[k], events_circles[i].name, order);
-      assert_true (order > 1.7);
+      if (order > 1.7 || error[0] < 1e-9) continue;
+      print_error ("%s, %s: order %g\n", method[k], events_circles[i].name, order);
+      fail ();
+    }
+}
+
+/* Where u passes 0 at a small distance, its direction turns within less than a step.  Final states from the equations
+ * of one phase, written by hand, integrated by DOP853 of scipy 1.10 at 1e-13. */
+TEST (passes_beside_0) {
+  static const struct {
+    const char *set;
+    double q[2], v[2];
+  } of[] = { { "torque=0.1", { 0.060643101604048, -0.05523707896227 }, { 0.12155583574851, -0.6686956602707 } },
+             { "torque=0.02", { 0.012141629739368, -0.055545188740321 }, { 0.024337503570414, -0.66675172275695 } } };
+  static const struct {
+    const char *method;
+    double rtol, bound;
+  } by[] = { { "rk4+projection", 0, 2e-6 }, { "erk5+projection", 1e-6, 1e-6 }, { "erk8+projection", 1e-8, 1e-8 },
+             { "radau+ggl", 1e-6, 1e-7 },   { "bdf+projection", 1e-8, 1e-6 },  { "ida+ggl", 1e-8, 1e-6 } };
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++)
+    for (size_t k = 0; k < sizeof by / sizeof *by; k++) {
+      double q[6], v[6];
+      pw_system *s = runs_scene ("beside", of[i].set);
+      runs_state (s, by[k].method, &(pw_settings){ .step = 1e-2, .rtol = by[k].rtol }, 1, q, v, NULL);
+      for (int j = 0; j < 2; j++) {
+        check_close (by[k].method, q[j], of[i].q[j], by[k].bound,
+                     "a step of 1e-2 s, 10 rtol, and more where steps are many");
+        check_close (by[k].method, v[j], of[i].v[j], by[k].bound, "the same");
+      }
+      pw_system_free (s);
     }
 }
 
