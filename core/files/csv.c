@@ -1,8 +1,7 @@
 /* Tables of samples: CSV with a line per sample, or NumPy archives.  The columns are
  *
  *   t [s] | states of bodies, of internal coordinates | contact points | reactions | outputs | residuals | energies
- *
- * The functions of a group of columns write their names or their values, as pw_csv.names says. */
+ */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -11,124 +10,87 @@
 
 struct pw_csv {
   const pw_system *system;
-  int ledger;
-  pw_workspace *workspace; /* for contact points; NULL if the system has none */
-  double (*contact)[3];    /* contact points of the system */
+  pw_workspace *workspace;
+  pw_column *column; /* columns: of the table */
+  size_t columns;
   pw_output *output;
   FILE *f;
-  int names;  /* 1: the current line has the names of the columns, else their values */
-  int cells;  /* written in the current line */
+  char *line; /* columns x 33 */
   int failed; /* 1: memory was exhausted */
-  char *line; /* of values */
-  size_t length, line_room;
   /* of an archive, whose arrays are written when the table is closed */
   int is_archive;
-  double *value;                /* line by line */
-  size_t values, room, columns; /* so far; allocated; values per line */
+  double *value;       /* line by line */
+  size_t values, room; /* so far; allocated */
   pw_npz npz;
 };
 
-static void csv_name (pw_csv *c, const char *name, const char *unit) {
-  if (c->is_archive) {
-    size_t rows = c->columns ? c->values / c->columns : 0;
-    double *column = malloc ((rows + 1) * sizeof *column);
-    c->failed |= column == NULL;
-    for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
-    if (column) pw_npz_add (&c->npz, name, (long)rows, -1, 1, column);
-    free (column);
-  } else {
-    fprintf (c->f, "%s%s", c->cells ? "," : "", name);
-    if (unit && *unit) fprintf (c->f, " [%s]", unit);
+/* Lists the columns; with `column` NULL, only counts them. */
+static size_t csv_columns (const pw_system *s, int ledger, pw_column *column) {
+  static const pw_column_type after_states[] = { PW_COLUMN_CONTACT,   PW_COLUMN_REACTION, PW_COLUMN_OUTPUT,
+                                                 PW_COLUMN_POSITION,  PW_COLUMN_VELOCITY, PW_COLUMN_KINETIC,
+                                                 PW_COLUMN_POTENTIAL, PW_COLUMN_LEDGER,   PW_COLUMN_PROJECTION,
+                                                 PW_COLUMN_BALANCE };
+  const int bodies = pw_system_bodies (s), n = pw_system_coordinates (s), types = ledger ? 10 : 5;
+  size_t count = 0;
+#define CSV_ADD(type, index) (column ? (void)(column[count] = (pw_column){ type, index }) : (void)0, count++)
+  CSV_ADD (PW_COLUMN_TIME, 0);
+  for (int i = 0; i < 2 * n; i++) { /* positions and velocities of each body, then of each internal coordinate */
+    const int k = i % 6, state = i >= 6 * bodies ? i / 2 + (i % 2) * n : 3 * (i / 6) + (k < 3 ? k : n + k - 3);
+    if (!pw_system_state_hidden (s, state)) CSV_ADD (PW_COLUMN_STATE, state);
   }
-  c->cells++;
+  for (int k = 0; k < types; k++)
+    for (int i = 0; i < pw_system_columns (s, after_states[k]); i++) CSV_ADD (after_states[k], i);
+  return count;
 }
 
-static void csv_number (pw_csv *c, double value) {
-  if (c->is_archive) {
-    c->failed |= pw_grow (&c->value, c->values, &c->room, sizeof *c->value) != PW_OK;
-    if (!c->failed) c->value[c->values++] = value;
-  } else {
-    c->failed |= pw_grow (&c->line, c->length + 33, &c->line_room, 1) != PW_OK;
-    if (c->failed) return;
-    char *text = c->line + c->length;
-    if (c->cells) *text++ = ',';
-    pw_format (text, isfinite (value) ? value : NAN, 17);
-    c->length = (size_t)(strchr (text, 0) - c->line);
-  }
-  c->cells++;
-}
-
-/* Writes the name of the next column or its value, and evaluates only that. */
-#define CSV_CELL(c, name, unit, value) ((c)->names ? csv_name (c, name, unit) : csv_number (c, value))
-
-static void csv_state (pw_csv *c, const pw_sample *x, int state) {
-  int n = pw_system_coordinates (c->system);
-  if (pw_system_state_hidden (c->system, state)) return;
-  CSV_CELL (c, PW_NAME (pw_system_state_name, c->system, state), pw_system_state_unit (c->system, state),
-            state < n ? x->q[state] : x->v[state - n]);
-}
-
-static int csv_line (pw_csv *c, int names, const pw_sample *x, pw_error *error) {
-  const pw_system *s = c->system;
-  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
-  int contacts = c->workspace ? pw_system_contacts (s) : 0;
+/* The line of names or, of an archive, all arrays. */
+static int csv_names (pw_csv *c, pw_error *error) {
+  const size_t rows = c->values / c->columns;
+  double *value = c->is_archive ? malloc ((rows + 1) * sizeof *value) : NULL;
+  c->failed |= c->is_archive && value == NULL;
   errno = 0; /* for pw_output_check */
-  c->names = names;
-  c->cells = 0, c->length = 0;
-  CSV_CELL (c, "t", "s", x->t);
-  for (int b = 0; b < bodies; b++)
-    for (int i = 0; i < 6; i++) csv_state (c, x, i < 3 ? 3 * b + i : n + 3 * b + i - 3);
-  for (int i = 6 * bodies; i < 2 * n; i++) csv_state (c, x, i % 2 ? n + i / 2 : i / 2);
-  for (int i = 0; i < 2 * contacts; i++)
-    CSV_CELL (c, PW_NAME (pw_system_contact_name, s, i), "m", c->contact[i / 2][i % 2]);
-  for (int i = 0; i < pw_system_rows (s); i++)
-    CSV_CELL (c, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i),
-              0 - x->lambda[i]); /* avoids -0 */
-  for (int i = 0; i < pw_system_outputs (s); i++)
-    CSV_CELL (c, pw_system_output_name (s, i), pw_system_output_unit (s, i), x->output[i]);
-  CSV_CELL (c, "residual.position", NULL, x->position);
-  CSV_CELL (c, "residual.velocity", NULL, x->velocity);
-  if (c->ledger) {
-    CSV_CELL (c, "kinetic", "J", x->kinetic);
-    CSV_CELL (c, "potential", "J", x->potential);
-    for (int i = 0; i < pw_system_ledger_entries (s); i++)
-      CSV_CELL (c, PW_NAME (pw_system_ledger_name, s, i), "J", x->ledger ? x->ledger[i] : NAN);
-    CSV_CELL (c, "projection", "J", x->projection);
-    CSV_CELL (c, "balance", "J", x->balance);
+  for (size_t i = 0; i < c->columns && !c->failed; i++) {
+    const char *name = PW_NAME (pw_system_column_name, c->system, c->column[i]),
+               *unit = pw_system_column_unit (c->system, c->column[i]);
+    for (size_t row = 0; value && row < rows; row++) value[row] = c->value[row * c->columns + i];
+    if (value)
+      pw_npz_add (&c->npz, name, (long)rows, -1, 1, value);
+    else
+      fprintf (c->f, *unit ? "%s%s [%s]" : "%s%s", i ? "," : "", name, unit);
   }
-  c->columns = (size_t)c->cells;
+  free (value);
   if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
-  if (c->is_archive) return PW_OK;
-  if (c->length) fwrite (c->line, 1, c->length, c->f);
-  fputc ('\n', c->f);
+  if (!c->is_archive) fputc ('\n', c->f);
   return pw_output_check (c->output, error);
 }
 
 static void csv_free (pw_csv *c) {
   if (c == NULL) return;
   pw_workspace_free (c->workspace);
-  free (c->value);
+  free (c->column);
   free (c->line);
-  free (c->contact);
+  free (c->value);
   free (c);
 }
 
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return NULL;
-  int contacts = pw_system_contacts (s), is_archive = pw_output_named (o, ".npz"), continued = pw_output_continued (o);
+  const int is_archive = pw_output_named (o, ".npz"), continued = pw_output_continued (o);
   if (is_archive && continued) {
     pw_fail (error, PW_INPUT, "an archive of arrays cannot be continued: write a table that ends in .csv");
     return NULL;
   }
   pw_csv *c = calloc (1, sizeof *c);
   if (c) {
-    *c = (pw_csv){ .system = s, .ledger = ledger, .output = o, .f = pw_output_stream (o), .is_archive = is_archive };
-    c->npz.f = c->f;
-    c->contact = calloc ((size_t)contacts + 1, sizeof *c->contact);
-    c->workspace = contacts > 0 ? pw_workspace_new (s, error) : NULL;
+    *c = (pw_csv){ .system = s, .output = o, .f = pw_output_stream (o), .is_archive = is_archive };
+    c->npz.f = c->f, c->columns = csv_columns (s, ledger, NULL);
+    c->column = malloc (c->columns * sizeof *c->column), c->line = malloc (c->columns * 33);
+    c->workspace = pw_workspace_new (s, error);
+    if (c->column) csv_columns (s, ledger, c->column);
+    c->failed = pw_grow (&c->value, c->columns, &c->room, sizeof *c->value) != PW_OK;
   }
-  int complete = c && c->contact && (c->workspace || contacts == 0);
-  if (complete && (is_archive || continued || csv_line (c, 1, &(pw_sample){ 0 }, error) == PW_OK)) return c;
+  const int complete = c && c->column && c->line && c->workspace && !c->failed;
+  if (complete && (is_archive || continued || csv_names (c, error) == PW_OK)) return c;
   pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   csv_free (c);
   return NULL;
@@ -137,15 +99,28 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
   int status = pw_require (c, "a table", error);
   (void)s; /* the table has that of pw_csv_open */
-  if (status == PW_OK && c->workspace)
-    status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
-  return status == PW_OK ? csv_line (c, 0, sample, error) : status;
+  if (status != PW_OK) return status;
+  if (c->is_archive && pw_grow (&c->value, c->values + c->columns, &c->room, sizeof *c->value) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
+  double *value = c->value + c->values;
+  status = pw_workspace_columns (c->workspace, sample, c->column, (int)c->columns, value, error);
+  if (status != PW_OK) return status;
+  if (c->is_archive) return c->values += c->columns, PW_OK;
+  errno = 0; /* for pw_output_check */
+  char *end = c->line;
+  for (size_t i = 0; i < c->columns; i++) {
+    pw_format (end, isfinite (value[i]) ? value[i] : NAN, 17);
+    end = strchr (end, 0);
+    *end++ = i + 1 < c->columns ? ',' : '\n';
+  }
+  fwrite (c->line, 1, (size_t)(end - c->line), c->f);
+  return pw_output_check (c->output, error);
 }
 
 int pw_csv_close (pw_csv *c, pw_error *error) {
   int status = PW_OK;
   if (c && c->is_archive) {
-    status = csv_line (c, 1, &(pw_sample){ 0 }, error);
+    status = csv_names (c, error);
     int end = pw_npz_end (&c->npz, error);
     if (status == PW_OK) status = end == PW_OK ? pw_output_check (c->output, error) : end;
   }
