@@ -111,10 +111,10 @@ void pw_arena_free (pw_arena *a) {
   }
 }
 
-char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
+char *pw_alloc_arrays (pw_arena *a, const pw_array *array, size_t arrays) {
   size_t bytes = 1;
   for (size_t i = 0; i < arrays; i++) bytes += store_round (array[i].count * array[i].size, STORE_ALIGN);
-  char *memory = calloc (1, bytes), *at = memory;
+  char *memory = a ? pw_arena_alloc (a, bytes) : calloc (1, bytes), *at = memory;
   for (size_t i = 0; i < arrays; i++) { /* pointers to any type */
     memcpy (array[i].at, &at, sizeof at);
     if (memory) at += store_round (array[i].count * array[i].size, STORE_ALIGN);

@@ -144,10 +144,12 @@ typedef struct {
 } pw_array;
 #define PW_ARRAY(pointer, count) \
   { &(pointer), (size_t)(count), sizeof *(pointer) }
-/* Lays out arrays in one zeroed allocation and returns it; if out of memory, NULL, and so are all pointers. */
-char *pw_alloc_arrays (const pw_array *array, size_t arrays);
-#define PW_ALLOC_ARRAYS(...) \
-  pw_alloc_arrays ((const pw_array[]){ __VA_ARGS__ }, sizeof ((const pw_array[]){ __VA_ARGS__ }) / sizeof (pw_array))
+#define PW_ARRAYS(...) (const pw_array[]){ __VA_ARGS__ }, sizeof ((const pw_array[]){ __VA_ARGS__ }) / sizeof (pw_array)
+/* Lays out arrays in one zeroed allocation, in an arena or, if that is NULL, for the caller to free, and returns it; if
+ * out of memory, NULL, and so are all pointers. */
+char *pw_alloc_arrays (pw_arena *a, const pw_array *array, size_t arrays);
+#define PW_ALLOC_ARRAYS(...) pw_alloc_arrays (NULL, PW_ARRAYS (__VA_ARGS__))
+#define PW_ARENA_ARRAYS(arena, ...) pw_alloc_arrays (arena, PW_ARRAYS (__VA_ARGS__))
 
 /* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  For libraries that crash if an allocation fails. */
 int pw_check_memory (size_t bytes);

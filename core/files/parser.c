@@ -96,10 +96,12 @@ const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_
 int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena) {
   if (s->index.slot && room <= s->room) return PW_OK;
   size_t n = room > 2 * s->room ? (size_t)room + 1 : 2 * (size_t)s->room; /* never an empty allocation */
-  const char **name = pw_arena_alloc (arena, n * sizeof *name);
-  double *value = pw_arena_alloc (arena, n * sizeof *value);
-  pw_path **path = pw_arena_alloc (arena, n * sizeof *path);
-  if (name == NULL || value == NULL || path == NULL || pw_names_reserve (&s->index, n) != PW_OK) return PW_RESOURCE;
+  const char **name;
+  double *value;
+  pw_path **path;
+  if (!PW_ARENA_ARRAYS (arena, PW_ARRAY (name, n), PW_ARRAY (value, n), PW_ARRAY (path, n)) ||
+      pw_names_reserve (&s->index, n) != PW_OK)
+    return PW_RESOURCE;
   if (s->names) memcpy (name, s->name, (size_t)s->names * sizeof *name);
   if (s->names) memcpy (value, s->value, (size_t)s->names * sizeof *value);
   if (s->names) memcpy (path, s->path, (size_t)s->names * sizeof *path);

@@ -53,11 +53,11 @@ static int read_reference (pw_reader *r) {
   if (r->y->reference || r->operations > 0) /* expressions may use names, whose values `show` writes */
     t->names = r->numbers, t->name = r->scope->name, t->value = r->scope->value;
   if (r->y->reference == NULL) return PW_OK;
-  t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
-  t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
-  t->context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
-  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&r->truth, room) != PW_OK)
+  const pw_expression **x;
+  if (!PW_ARENA_ARRAYS (r->arena, PW_ARRAY (t->state, room), PW_ARRAY (t->text, room), PW_ARRAY (x, room)) ||
+      pw_names_open (&r->truth, room) != PW_OK)
     return read_no_memory (r);
+  t->context = x;
   return pw_yaml_entries (r, r->y->reference, reference_entry);
 }
 

@@ -371,9 +371,8 @@ typedef struct {
 
 static int pairs_list (pw_reader *r, const pw_node *list, const char *form, pairs *p) {
   if (pw_yaml_list (r, list, r->label) != PW_OK) return r->error->status;
-  size_t bytes = (size_t)list->count * sizeof (double);
-  p->x = pw_arena_alloc (r->arena, bytes), p->y = pw_arena_alloc (r->arena, bytes);
-  if (p->x == NULL || p->y == NULL) return read_no_memory (r);
+  if (!PW_ARENA_ARRAYS (r->arena, PW_ARRAY (p->x, list->count), PW_ARRAY (p->y, list->count)))
+    return read_no_memory (r);
   for (const pw_node *n = list->first; n; n = n->next, p->count++) {
     double pair[2] = { 0 };
     const char *label = PW_PRINTED (240, "%s: point %d", r->label, p->count + 1);
@@ -676,15 +675,14 @@ static int outline_svg (pw_reader *r, const pw_node *node, pairs *p) {
   int status = pw_read_rest (f, OUTLINE_MAX_BYTES, name, "the limit for a drawing", &text, &size, &cause);
   fclose (f);
   if (status == PW_OK) why = pw_svg_outline (text, &points, &status);
-  p->x = pw_arena_alloc (r->arena, (points.count + 1) * sizeof *p->x);
-  p->y = pw_arena_alloc (r->arena, (points.count + 1) * sizeof *p->y);
-  for (size_t i = 0; p->x && p->y && i < points.count; i++) p->x[i] = points.point[i][0], p->y[i] = points.point[i][1];
+  PW_ARENA_ARRAYS (r->arena, PW_ARRAY (p->x, points.count), PW_ARRAY (p->y, points.count));
+  for (size_t i = 0; p->x && i < points.count; i++) p->x[i] = points.point[i][0], p->y[i] = points.point[i][1];
   p->count = (int)points.count;
   free (points.point);
   free (text);
   if (status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text);
   if (*why) return read_fail (r, node->at, "%s: %.60s: %s", r->label, name, why);
-  return status == PW_OK && p->x && p->y ? PW_OK : read_no_memory (r);
+  return status == PW_OK && p->x ? PW_OK : read_no_memory (r);
 }
 
 /* Scales the corners about the middle of their box, so that it has this width, and moves the middle to the origin; 0 if

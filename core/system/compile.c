@@ -42,6 +42,8 @@ static void *compile_alloc (const compilation *job, size_t count, size_t size) {
   return p;
 }
 
+#define compile_arrays(job, ...) (PW_ARENA_ARRAYS (&(job)->s->arena, __VA_ARGS__) ? PW_OK : compile_no_memory (job))
+
 static const char *compile_text (const compilation *job, const char *text) {
   const char *copy = pw_arena_copy (&job->s->arena, text);
   if (copy == NULL) compile_no_memory (job);
@@ -152,19 +154,11 @@ static int compile_sizes (const compilation *job) {
     s->saturates |= kind->saturation != NULL;
   }
   if (s->coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
-  size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
-  s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
-  s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
-  s->state_unit = compile_alloc (job, 2 * (coords - (size_t)s->mechanical), sizeof *s->state_unit);
-  s->angle_user = compile_alloc (job, bodies, sizeof *s->angle_user);
-  s->M = compile_alloc (job, 6 * coords + 3, sizeof *s->M); /* and those after it */
-  s->origin = compile_alloc (job, 2 * coords, 1);
-  if (s->source == NULL || s->body_name == NULL || s->state_unit == NULL || s->angle_user == NULL || s->M == NULL ||
-      s->origin == NULL)
-    return PW_RESOURCE;
-  s->mass = s->M + coords, s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords,
-  s->constant = s->v0 + coords;
-  return PW_OK;
+  return compile_arrays (job, PW_ARRAY (s->source, s->sources), PW_ARRAY (s->body_name, s->bodies),
+                         PW_ARRAY (s->state_unit, 2 * (s->coords - s->mechanical)), PW_ARRAY (s->angle_user, s->bodies),
+                         PW_ARRAY (s->M, s->coords), PW_ARRAY (s->mass, s->coords), PW_ARRAY (s->metric, s->coords),
+                         PW_ARRAY (s->q0, s->coords), PW_ARRAY (s->v0, s->coords),
+                         PW_ARRAY (s->constant, s->coords + 3), PW_ARRAY (s->origin, 2 * s->coords));
 }
 
 /* Origin of the initial value of a body's state (0 to 5: x to omega); `zero`: the origin of a 0 without `specified`. */
@@ -257,11 +251,10 @@ static int compile_batches (const compilation *job) {
   int status = PW_OK;
   for (pw_element_batch *k = job->s->batch; k < job->s->batch + job->s->batches && status == PW_OK; k++) {
     size_t n = (size_t)k->b.count, size = k->kind->element, bodies = (size_t)k->kind->bodies;
-    unsigned char *element = compile_alloc (job, n * size + COMPILE_GUARD, 1);
-    int *body = compile_alloc (job, n * bodies, sizeof *body);
-    k->column = compile_alloc (job, n * bodies, sizeof *k->column);
-    k->name = compile_alloc (job, n, sizeof *k->name);
-    if (!element || !body || !k->column || !k->name) return PW_RESOURCE;
+    unsigned char *element;
+    int *body;
+    status = compile_arrays (job, PW_ARRAY (element, n * size + COMPILE_GUARD), PW_ARRAY (body, n * bodies),
+                             PW_ARRAY (k->column, n * bodies), PW_ARRAY (k->name, n));
     k->b.element = element;
     k->b.body = body;
     k->source = source;
@@ -484,9 +477,9 @@ static void compile_partners (pw_system *s, const pw_element_batch *k) {
 static int compile_limits (const compilation *job) {
   pw_system *s = job->s;
   const compiled *from = job->list;
-  pw_bounds *limit = compile_alloc (job, (size_t)s->rows, sizeof *limit);
-  s->limit_source = compile_alloc (job, (size_t)s->rows, sizeof *s->limit_source);
-  if (limit == NULL || s->limit_source == NULL) return PW_RESOURCE;
+  pw_bounds *limit;
+  const int status = compile_arrays (job, PW_ARRAY (limit, s->rows), PW_ARRAY (s->limit_source, s->rows));
+  if (status != PW_OK) return status;
   for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, .circle = 0 };
   for (int b = 0; b < s->constraints; b++)
     for (int e = 0; e < s->batch[b].b.count; e++, from++) {

@@ -562,9 +562,8 @@ static int massless_check (const saddle_plan *p, pw_component *c, pw_error *erro
 static int massless_open (saddle_plan *p, pw_error *error) {
   pw_saddle *saddle = p->saddle;
   int status = PW_OK;
-  p->parent = pw_arena_alloc (&p->arena, (size_t)p->groups * sizeof *p->parent);
-  p->member = pw_arena_alloc (&p->arena, (size_t)p->groups * sizeof *p->member);
-  if (p->parent == NULL || p->member == NULL) return PW_RESOURCE;
+  if (!PW_ARENA_ARRAYS (&p->arena, PW_ARRAY (p->parent, p->groups), PW_ARRAY (p->member, p->groups)))
+    return PW_RESOURCE;
   for (int g = 0; g < p->groups; g++) p->parent[g] = g, p->member[g] = -1;
   for (int i = 0; i < saddle->s->rows; i++) saddle->component_of_row[i] = -1;
   massless_unite (p);
@@ -693,9 +692,9 @@ static void condense_components (saddle_plan *plan) {
 
 /* Sorts the contributions by group. */
 static int condense_sort (saddle_plan *plan) {
-  plan->start = pw_arena_alloc (&plan->arena, ((size_t)plan->groups + 2) * sizeof *plan->start);
-  plan->list = pw_arena_alloc (&plan->arena, (size_t)plan->contributions * sizeof *plan->list);
-  if (plan->failed || plan->start == NULL || plan->list == NULL) return PW_RESOURCE;
+  if (plan->failed || !PW_ARENA_ARRAYS (&plan->arena, PW_ARRAY (plan->start, plan->groups + 2),
+                                        PW_ARRAY (plan->list, plan->contributions)))
+    return PW_RESOURCE;
   for (int p = 0; p < plan->contributions; p++) plan->start[plan->contribution[p].group + 2]++;
   for (int g = 0; g < plan->groups; g++) plan->start[g + 2] += plan->start[g + 1];
   for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].group + 1]++] = p;
@@ -714,10 +713,11 @@ static int condense_end (const saddle_plan *plan, int n) {
 static int condense_find_dependent (saddle_plan *plan, int *row) {
   const pw_saddle *saddle = plan->saddle;
   size_t coords = (size_t)saddle->s->coords, equations = 2 * (size_t)plan->nodes; /* at most */
-  int *match = pw_arena_alloc (&plan->arena, (coords + 8 * equations + 1) * sizeof *match), count = 0, entries = 0;
-  int *coordinate = pw_arena_alloc (&plan->arena, (6 * (size_t)plan->contributions + 1) * sizeof *coordinate);
-  if (match == NULL || coordinate == NULL) return PW_RESOURCE;
-  int *equation = match + coords, *is_matched = equation + equations, *first = is_matched + equations;
+  int *match, *coordinate, *equation, *is_matched, *first, *more, count = 0, entries = 0;
+  if (!PW_ARENA_ARRAYS (&plan->arena, PW_ARRAY (match, coords), PW_ARRAY (coordinate, 6 * (size_t)plan->contributions),
+                        PW_ARRAY (equation, equations), PW_ARRAY (is_matched, equations),
+                        PW_ARRAY (first, equations + 1), PW_ARRAY (more, 5 * equations)))
+    return PW_RESOURCE;
   double work;
   for (int n = 0; n < plan->nodes; n++)
     for (int i = 0; i < plan->node[n].size; i++) {
@@ -729,7 +729,7 @@ static int condense_find_dependent (saddle_plan *plan, int *row) {
       }
       first[++count] = entries;
     }
-  if (btf_maxtrans ((int)coords, count, first, coordinate, 0, &work, match, first + count + 1) == count) return PW_OK;
+  if (btf_maxtrans ((int)coords, count, first, coordinate, 0, &work, match, more) == count) return PW_OK;
   for (size_t j = 0; j < coords; j++)
     if (match[j] >= 0) is_matched[match[j]] = 1;
   for (count = 0; is_matched[count];) count++;
@@ -906,11 +906,10 @@ static int chain_link (const saddle_plan *plan, const pw_block_ldl *l, int body,
 /* Finds the chains.  The contributions to each group in plan->list must be sorted by the columns of their nodes in l.
  * PW_OK or PW_RESOURCE. */
 static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
-  size_t nodes = (size_t)l->nodes;
-  pw_chain_between *between = pw_arena_alloc (&plan->arena, nodes * sizeof *between);
-  plan->chain = pw_arena_alloc (&plan->arena, nodes * sizeof *plan->chain);
-  plan->is_linked = pw_arena_alloc (&plan->arena, (size_t)plan->groups);
-  if (!between || !plan->chain || !plan->is_linked) return PW_RESOURCE;
+  pw_chain_between *between;
+  if (!PW_ARENA_ARRAYS (&plan->arena, PW_ARRAY (between, l->nodes), PW_ARRAY (plan->chain, l->nodes),
+                        PW_ARRAY (plan->is_linked, plan->groups)))
+    return PW_RESOURCE;
   for (int p = 0; p < plan->contributions; p++) between[l->column_of_node[plan->contribution[p].node]].contributions++;
   for (int body = 0; body < plan->saddle->s->bodies; body++) {
     pw_chain link;

@@ -867,7 +867,7 @@ static int rk_allocate (pw_method_data *d, const pw_run *r) {
     array[count++] = (pw_array)PW_ARRAY (x->ledger, entries);
     array[count++] = (pw_array)PW_ARRAY (x->rate, entries);
   }
-  d->memory = pw_alloc_arrays (array, count);
+  d->memory = pw_alloc_arrays (NULL, array, count);
   if (d->memory == NULL) return PW_RESOURCE;
   rk_point (d->q, n, &d->q, &d->v, &d->a, &d->lambda);
   return PW_OK;

@@ -22,12 +22,13 @@ static int specialised_update (void *workspace, double t, const double *q, const
 /* Makes r->scene, the data of the compiled code; PW_OK or PW_RESOURCE. */
 static int specialised_allocate (pw_run *r, int constants) {
   const pw_system *s = r->s;
-  const void **element = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *element);
-  const pw_kind **kind = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *kind);
-  const pw_signal **signal = pw_arena_alloc (&r->arena, (size_t)s->sources * sizeof *signal);
-  double *constant = pw_arena_alloc (&r->arena, (size_t)constants * sizeof *constant); /* filled by `prepare` */
-  r->scene = pw_arena_alloc (&r->arena, sizeof *r->scene);
-  if (!element || !kind || !signal || !constant || !r->scene) return PW_RESOURCE;
+  const void **element;
+  const pw_kind **kind;
+  const pw_signal **signal;
+  double *constant; /* filled by `prepare` */
+  if (!PW_ARENA_ARRAYS (&r->arena, PW_ARRAY (element, s->batches), PW_ARRAY (kind, s->batches),
+                        PW_ARRAY (signal, s->sources), PW_ARRAY (constant, constants), PW_ARRAY (r->scene, 1)))
+    return PW_RESOURCE;
   for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
   for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
   *r->scene = (pw_scene){ .element = element,

@@ -423,13 +423,11 @@ static void independent_activate (pw_run *r, const unsigned char *active) {
 
 /* Allocates what the run needs for its redundant rows, `redundant` in number, and activates the others. */
 static int independent_store (pw_run *r, const unsigned char *active, size_t redundant) {
-  size_t rows = (size_t)r->s->rows, number = sizeof *r->coefficient;
-  r->active_array = pw_arena_alloc (&r->arena, rows);
-  r->redundant_row = pw_arena_alloc (&r->arena, redundant * sizeof *r->redundant_row);
-  r->coefficient = pw_arena_alloc (&r->arena, 5 * rows * number);
-  r->row_force = pw_arena_alloc (&r->arena, ((size_t)r->s->coords + 3 + rows) * number);
-  if (!r->active_array || !r->redundant_row || !r->coefficient || !r->row_force) return PW_RESOURCE;
-  r->least_norm = r->row_force + r->s->coords + 3;
+  const int rows = r->s->rows;
+  if (!PW_ARENA_ARRAYS (&r->arena, PW_ARRAY (r->active_array, rows), PW_ARRAY (r->redundant_row, redundant),
+                        PW_ARRAY (r->coefficient, 5 * rows), PW_ARRAY (r->row_force, r->s->coords + 3),
+                        PW_ARRAY (r->least_norm, rows)))
+    return PW_RESOURCE;
   independent_activate (r, active);
   return PW_OK;
 }

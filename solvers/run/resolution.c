@@ -184,12 +184,12 @@ int pw_resolution_open (pw_run *r, pw_error *error) {
     if (longest < found.harmonic) found.harmonic = longest, found.missed = source;
   }
   if (found.count == 0 && !(found.harmonic < (r->fixed_steps ? r->settings.step : INFINITY))) return PW_OK;
-  d = r->resolution = pw_arena_alloc (&r->arena, sizeof *d);
-  resolution_signal *signal = pw_arena_alloc (&r->arena, (size_t)found.count * sizeof *signal);
-  double *x = pw_arena_alloc (&r->arena, (size_t)(2 * (most + 1) + 3 * found.count + 2 * reads) * sizeof *x);
-  if (d == NULL || signal == NULL || x == NULL) return pw_fail_memory (s, error);
-  *d = found;
-  d->signal = signal, d->lo = x, d->hi = x + most + 1, x += 2 * (most + 1);
+  double *x;
+  if (!PW_ARENA_ARRAYS (&r->arena, PW_ARRAY (d, 1), PW_ARRAY (found.signal, found.count), PW_ARRAY (found.lo, most + 1),
+                        PW_ARRAY (found.hi, most + 1), PW_ARRAY (x, 3 * found.count + 2 * reads)))
+    return pw_fail_memory (s, error);
+  resolution_signal *signal = found.signal;
+  *(r->resolution = d) = found;
   for (const pw_source *source = r->w->source; source < r->w->source + s->sources; source++) {
     if (!pw_signal_is_bounded (source)) continue;
     double bounds[2]; /* in all states during the run */

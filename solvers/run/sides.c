@@ -155,15 +155,15 @@ int pw_sides_open (pw_run *r, pw_error *error) {
     reads = x->reads > reads ? x->reads : reads;
   }
   if (count == 0) return PW_OK;
-  const size_t n = (size_t)count, numbers = (PW_CROSSING_DEPTH + 7) * n +
-                                            (size_t)(reads + 2 * r->s->coords + r->entries) + pw_state_length (r->s);
   pw_sides *x = r->sides = pw_arena_alloc (&r->arena, sizeof *x);
-  double *memory = pw_arena_alloc (&r->arena, numbers * sizeof *memory);
-  unsigned char *changed = pw_arena_alloc (&r->arena, n);
-  if (x == NULL || memory == NULL || changed == NULL) return r->sides = NULL, pw_fail_memory (r->s, error);
-  *x = (pw_sides){ .count = count, .changed = changed, .start = memory };
-  x->end = x->start + n, x->start_rate = x->end + n, x->end_rate = x->start_rate + n, x->now = x->end_rate + n;
-  x->memory = x->now + n, x->read = x->memory + (PW_CROSSING_DEPTH + 2) * n, x->state = x->read + reads;
-  x->found.q = x->state + 2 * r->s->coords, x->found.ledger = x->found.q + pw_state_length (r->s);
+  const size_t states = pw_state_length (r->s);
+  if (x) x->count = count;
+  if (x == NULL ||
+      !PW_ARENA_ARRAYS (&r->arena, PW_ARRAY (x->start, count), PW_ARRAY (x->end, count),
+                        PW_ARRAY (x->start_rate, count), PW_ARRAY (x->end_rate, count), PW_ARRAY (x->now, count),
+                        PW_ARRAY (x->memory, (PW_CROSSING_DEPTH + 2) * count), PW_ARRAY (x->read, reads),
+                        PW_ARRAY (x->state, 2 * r->s->coords), PW_ARRAY (x->found.q, states),
+                        PW_ARRAY (x->found.ledger, r->entries), PW_ARRAY (x->changed, count)))
+    return r->sides = NULL, pw_fail_memory (r->s, error);
   return PW_OK;
 }
