@@ -138,6 +138,7 @@ typedef struct {
   const char *method, *specialise, *width, *until;
   pw_cli_given max_file, t_end, step, rtol, atol, max_steps, limit, jobs;
   const char *table, *json, *plots; /* -o, --json, --plots of PW_RESULTS_OPTIONS */
+  int drawn;                        /* the status of figures, set before the summary is written */
   pw_cli_model m;                   /* opened by pw_cli_open */
   pw_files files;                   /* opened by pw_files_open */
   const pw_method **methods;        /* of --method-file, which pw_cli_file opens; ended by NULL, or NULL */

@@ -19,7 +19,7 @@ typedef enum { FIT_ALONG, FIT_EVENT, FIT_NUMBER } fit_kind;
 
 typedef struct {
   pw_cli_line line;
-  const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *time_name;
+  const char *data_path, *columns_text, *time_name;
   pw_cli_given confidence_given, starts_given, time_scale, time_offset;
   const char **free, **sigma_texts;
   pw_unknowns unknowns;
@@ -869,12 +869,12 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-static void fit_json (const pw_fit *fit, const char *status, FILE *f) {
-  pw_json json = { .f = f, .lines = 2 }, *j = &json;
+static void fit_json (const void *context, pw_json *j) {
+  const pw_fit *fit = context;
   char options[PW_UNKNOWNS_OPTIONS];
   pw_json_print (j, "{schema: %d, model: %s, status: %s, data: %s, options: %s, method: %s", 1,
-                 pw_file_name (fit->line.m.file), status, fit->data_path,
-                 pw_unknowns_options (&fit->unknowns, fit->estimate, options), fit->unknowns.method);
+                 pw_file_name (fit->line.m.file), pw_results_word (&fit->line, fit->interrupted, fit->converged),
+                 fit->data_path, pw_unknowns_options (&fit->unknowns, fit->estimate, options), fit->unknowns.method);
   pw_json_print (j, "residuals: %d, freedom: %d, weighted: %i, chi2: %g, confidence: %g, rank: %d, runs: %ld",
                  fit->residuals, fit_degrees_of_freedom (fit), fit->weighted, fit->chi2, fit->confidence, fit->rank,
                  fit->runs);
@@ -917,7 +917,7 @@ static int fit_table (const void *context, FILE *f, pw_error *error) {
   for (int i = 0; i < fit->columns; i++)
     for (int k = 0; k < 4; k++)
       pw_text_name (&t, PW_PRINTED (300, "%s%s", fit->column_name[i], part[k]), fit->column_unit[i]);
-  int status = pw_text_line (&t, f, fit->table_path, error);
+  int status = pw_text_line (&t, f, fit->line.table, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) {
     if (fit->timed) pw_text_number (&t, fit->t[row]);
     for (int i = 0; i < fit->columns; i++) {
@@ -927,17 +927,18 @@ static int fit_table (const void *context, FILE *f, pw_error *error) {
                                fit->weighted && known ? fit->sigma[k] : NAN };
       for (int c = 0; c < 4; c++) pw_text_number (&t, value[c]);
     }
-    status = pw_text_line (&t, f, fit->table_path, error);
+    status = pw_text_line (&t, f, fit->line.table, error);
   }
   return status;
 }
 
 /* Data and model of each column along the run, below them the residuals. */
-static int fit_draw (const pw_fit *fit, pw_error *error) {
+static int fit_draw (const void *context, pw_error *error) {
+  const pw_fit *fit = context;
   const int along = data_along (fit), several = along > 1;
   const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
   pw_curves c;
-  int status = pw_curves_open (&c, &fit->line, fit->plots_path, "fit", "data and fitted model", error);
+  int status = pw_curves_open (&c, &fit->line, fit->line.plots, "fit", "data and fitted model", error);
   if (status != PW_OK) return status;
   for (int i = 0, panels = 0; i < fit->columns && panels < REPORT_PANELS; i++) {
     if (fit->column_kind[i] != FIT_ALONG) continue;
@@ -966,7 +967,7 @@ static int fit_draw (const pw_fit *fit, pw_error *error) {
 
 #define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 
-enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
+static const pw_results fit_results = { "fit", 0, 2, fit_table, fit_json, fit_draw };
 
 static int fit_options (pw_fit *fit, pw_error *error) {
   const double starts = pw_cli_given_or (fit->starts_given, 1);
@@ -977,17 +978,10 @@ static int fit_options (pw_fit *fit, pw_error *error) {
     return pw_fail (error, PW_INPUT, "nothing to compare: add --columns NAME,..., columns of the data such as frame.x");
   if (!(fit->confidence < 1))
     return pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", fit->confidence_given.text);
-  if (starts > 1e5) return pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  return pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
+  return starts > 1e5 ? pw_fail (error, PW_INPUT, "--starts: at most 100000") : PW_OK;
 }
 
 static int fit_open (pw_fit *fit, pw_error *error) {
-  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--data", fit->data_path, PW_READS, NULL },
-                   { "-o", fit->table_path, PW_WRITES, pw_cli_tables },
-                   { "--json", fit->json_path, PW_WRITES, pw_cli_json },
-                   { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
   int status = fit_options (fit, error);
   if (status == PW_OK) status = pw_cli_open (&fit->line, error);
   if (status == PW_OK) status = pw_unknowns_open (&fit->unknowns, &fit->line, error);
@@ -998,27 +992,22 @@ static int fit_open (pw_fit *fit, pw_error *error) {
   if (fit->residuals < fit->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
                     fit->residuals, fit->unknowns.count);
-  if (fit->plots_path && fit->timed == 0)
+  if (fit->line.plots && fit->timed == 0)
     return pw_fail (error, PW_INPUT, "--plots: a figure has curves over time, and none of --columns is one");
   /* runs end at the time of the last row, but those with outputs not before their final time */
   const double last = fit->timed ? fit->t[fit->timed - 1] : 0;
   fit->unknowns.settings.span = data_along (fit) == fit->columns ? last : fmax (last, fit->t_end);
   status = pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
-  return status == PW_OK ? pw_files_open (&fit->line, use, sizeof use / sizeof *use, error) : status;
+  if (status != PW_OK) return status;
+  return pw_results_open (&fit->line, &fit_results, pw_cli_tables, (pw_use){ "--data", fit->data_path, PW_READS, NULL },
+                          error);
 }
 
 static int fit_finish (pw_fit *fit, pw_error *error) {
-  FILE *table = pw_files_stream (&fit->line, FIT_TABLE), *summary = pw_files_stream (&fit->line, FIT_SUMMARY);
-  pw_error drawing = { 0 };
   data_report (fit);
   fit_print (fit);
   pw_unknowns_report (&fit->unknowns, fit->estimate);
-  const int drawn = fit->plots_path ? fit_draw (fit, &drawing) : PW_OK;
-  const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
-  int status = table ? pw_cli_write_table (fit->table_path, table, fit, fit_table, error) : PW_OK;
-  if (summary) fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
-  if (status == PW_OK) status = pw_files_finish (&fit->line, error);
-  status = pw_figure_status (drawn, &drawing, status, error);
+  int status = pw_results_write (&fit->line, &fit_results, fit, error);
   if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
   if (status == PW_OK && !fit->converged)
@@ -1065,11 +1054,8 @@ static const struct poptOption fit_options_table[] = {
       "Search from the model's values and from N - 1 points between the bounds, without bounds within the "
       "value's own size of it (default 1)"),
   PW_JOBS_OPTION ("Number of concurrent runs (default: one per processor)"),
-  PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv",
-                  "Write data, model values and residuals, or as FILE.npz or FILE.json"),
-  PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
-  PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
-  PW_WIDTH_OPTION,
+  PW_RESULTS_OPTIONS ("Write data, model values and residuals", "Write a summary",
+                      "Write figures of data, model and residuals"),
   PW_METHOD_OPTIONS,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

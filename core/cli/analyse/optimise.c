@@ -28,7 +28,7 @@ typedef struct {
 
 typedef struct {
   pw_cli_line line;
-  const char *maximise, *minimise, *path, *json_path, *plots_path;
+  const char *maximise, *minimise;
   pw_cli_given starts_given, seed_given;
   const char **free, **subject_to;
   pw_unknowns unknowns;
@@ -588,10 +588,11 @@ static void optimise_print (const pw_optimise *problem) {
   if (pw_unknowns_options (&problem->unknowns, problem->best->to, options)) printf ("\n%s\n", options);
 }
 
-static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
-  pw_json json = { .f = f, .lines = 2 }, *j = &json;
+static void optimise_json (const void *context, pw_json *j) {
+  const pw_optimise *problem = context;
   char options[PW_UNKNOWNS_OPTIONS];
-  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (problem->line.m.file), status);
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (problem->line.m.file),
+                 pw_results_word (&problem->line, pw_stop != 0, problem->incomplete == NULL));
   pw_json_text (j, problem->maximise ? "maximise" : "minimise", problem->output[0]);
   pw_json_print (j, "value: %g, initial: %g, options: %s, method: %s, t_end: %g, seed: %g", problem->best->output[0],
                  report_initial (problem), pw_unknowns_options (&problem->unknowns, problem->best->to, options),
@@ -641,9 +642,11 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
   fprintf (f, " %s\n", values);
 }
 
-static void optimise_yaml (const pw_optimise *problem, FILE *f) {
+static int optimise_yaml (const void *context, FILE *f, pw_error *error) {
+  const pw_optimise *problem = context;
   char values[PW_UNKNOWNS_OPTIONS];
   const pw_search *best = problem->best;
+  (void)error; /* of writing: reported when the file is completed */
   if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
   if (problem->incomplete)
@@ -660,15 +663,17 @@ static void optimise_yaml (const pw_optimise *problem, FILE *f) {
       first = 0;
       fprintf (f, "  %s: %.17g\n", problem->unknowns.list[i].name, best->to[i]);
     }
+  return PW_OK;
 }
 
 /* The objective of every run against each unknown, the best one marked. */
-static int optimise_draw (const pw_optimise *problem, pw_error *error) {
+static int optimise_draw (const void *context, pw_error *error) {
+  const pw_optimise *problem = context;
   static const char *const style[] = { "infeasible", "feasible" };
   const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
   const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
   pw_curves c;
-  int status = pw_curves_open (&c, &problem->line, problem->plots_path, "optimise", "runs of the optimisation", error);
+  int status = pw_curves_open (&c, &problem->line, problem->line.plots, "optimise", "runs of the optimisation", error);
   if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     pw_curves_panel (
@@ -689,6 +694,8 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
+static const pw_results optimise_results = { "optimise", 0, 2, optimise_yaml, optimise_json, optimise_draw };
+
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
   const double starts = pw_cli_given_or (problem->starts_given, 10);
@@ -697,8 +704,6 @@ static int optimise_read (pw_optimise *problem, pw_error *error) {
   if (!problem->maximise == !problem->minimise)
     return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
   if (starts > 1e5) return pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  if (pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error) != PW_OK)
-    return error->status;
   for (const char **given = problem->subject_to; given && *given; given++) count++;
   problem->output = pw_arena_alloc (&problem->line.arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
   problem->unit = pw_arena_alloc (&problem->line.arena, count * sizeof *problem->unit);
@@ -737,16 +742,8 @@ static int optimise_open_outputs (pw_optimise *problem, int first, int count, co
   return status;
 }
 
-enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files of optimise_open */
-
 static int optimise_open (pw_optimise *problem, pw_error *error) {
-  static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
-                                         "optimise.png", "optimise.pdf", NULL },
-                           *const texts[] = { ".yaml", ".yml", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", problem->path, PW_WRITES, texts },
-                   { "--json", problem->json_path, PW_WRITES, pw_cli_json },
-                   { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
+  static const char *const texts[] = { ".yaml", ".yml", NULL };
   int status = pw_cli_open (&problem->line, error);
   problem->differentiable = 1;
   if (status == PW_OK)
@@ -755,7 +752,7 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
   if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, error);
   if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, "--free", problem->free, error);
   if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
-  if (status == PW_OK) status = pw_files_open (&problem->line, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK) status = pw_results_open (&problem->line, &optimise_results, texts, (pw_use){ 0 }, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;
 }
 
@@ -783,21 +780,15 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
 }
 
 static int optimise_finish (pw_optimise *problem, pw_error *error) {
-  FILE *result = pw_files_stream (&problem->line, OPTIMISE_RESULT),
-       *summary = pw_files_stream (&problem->line, OPTIMISE_SUMMARY);
   int stopped = pw_stop != 0;
   if (problem->best == NULL && stopped) pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
   if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
-  pw_error unconverged = { 0 }, drawing = { 0 };
+  pw_error unconverged = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
   problem->incomplete = stopped ? "the search was interrupted" : converged ? NULL : unconverged.text;
   optimise_print (problem);
   pw_unknowns_report (&problem->unknowns, problem->best->to);
-  if (result) optimise_yaml (problem, result);
-  const int drawn = problem->plots_path ? optimise_draw (problem, &drawing) : PW_OK;
-  const char *word = pw_cli_status_word (drawn != PW_OK || converged ? drawn : PW_METHOD);
-  if (summary) optimise_json (problem, stopped ? "interrupted" : word, summary);
-  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->line, error), error);
+  int status = pw_results_write (&problem->line, &optimise_results, problem, error);
   if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && stopped) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
@@ -827,11 +818,9 @@ static const struct poptOption optimise_options[] = {
                     "Search from the model's values and N - 1 points between the bounds (default 10)"),
   PW_NUMBER_OPTION (pw_optimise, seed_given, "seed", 0, "N", PW_COUNT, "Seed of these points (default 1)"),
   PW_JOBS_OPTION ("Number of concurrent runs (default: one per processor)"),
-  PW_TEXT_OPTION (pw_optimise, path, "output", 'o', "FILE.yaml",
+  PW_TEXT_OPTION (pw_cli_line, table, "output", 'o', "FILE.yaml",
                   "Write the values, with the command of their run as a comment"),
-  PW_TEXT_OPTION (pw_optimise, json_path, "json", 0, "FILE.json", "Write a summary"),
-  PW_TEXT_OPTION (pw_optimise, plots_path, "plots", 0, "DIR", "Write figures of all runs into a folder"),
-  PW_WIDTH_OPTION,
+  PW_SUMMARY_OPTIONS ("Write a summary", "Write figures of all runs"),
   PW_METHOD_OPTIONS,
   PW_UNTIL_OPTION,
   PW_MODEL_OPTIONS,

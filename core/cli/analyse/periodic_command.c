@@ -467,7 +467,8 @@ static void periodic_draw_multipliers (const pw_periodic_command *cmd, pw_curves
   }
 }
 
-static int periodic_draw (const pw_periodic_command *cmd, pw_error *error) {
+static int periodic_draw (const void *context, pw_error *error) {
+  const pw_periodic_command *cmd = context;
   const double range[] = { fmin (cmd->settings.first, cmd->settings.last),
                            fmax (cmd->settings.first, cmd->settings.last) };
   const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
@@ -482,11 +483,13 @@ static int periodic_draw (const pw_periodic_command *cmd, pw_error *error) {
   return pw_curves_draw (&c, status, error);
 }
 
+static const pw_results periodic_results = { "periodic", 1, 1, periodic_csv, periodic_json, periodic_draw };
+
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK) status = pw_results_open (&cmd->line, "periodic", 1, error);
+  if (status == PW_OK) status = pw_results_open (&cmd->line, &periodic_results, pw_cli_tables, (pw_use){ 0 }, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m), pw_cli_report_tables (cmd->line.m.system, cmd->settings.period);
   if (status == PW_OK) {
     pw_periodic_orbit o;
@@ -503,9 +506,7 @@ static int periodic_command (void *options, pw_error *error) {
   }
   if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
   if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
-  if (status == PW_OK && cmd->points)
-    status = pw_results_write (&cmd->line, 1, cmd, periodic_csv, periodic_json, error);
-  if (status == PW_OK && cmd->points && cmd->line.plots) status = periodic_draw (cmd, error);
+  if (status == PW_OK && cmd->points) status = pw_results_write (&cmd->line, &periodic_results, cmd, error);
   for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
   free (cmd->point);
   pw_periodic_close (cmd->search);

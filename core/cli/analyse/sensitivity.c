@@ -303,9 +303,11 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
 
 /* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be
  * compared. */
-static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
+static int sensitivity_draw (const void *context, pw_error *error) {
+  const sensitivity *cmd = context;
   const pw_unknowns *u = &cmd->unknowns;
   pw_curves c;
+  if (cmd->outputs.rows < 2) return PW_OK;
   int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "sensitivity", "derivatives along the run", error);
   if (status != PW_OK) return status;
   for (int o = 0; o < cmd->outputs.count; o++) {
@@ -325,6 +327,10 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   }
   return pw_curves_draw (&c, PW_OK, error);
 }
+
+static const pw_results sensitivity_results = {
+  "sensitivity", 1, 5, sensitivity_csv, sensitivity_json, sensitivity_draw
+};
 
 /* Sets the values of unknown initial states to those of the consistent initial state. */
 static int sensitivity_start (pw_unknowns *u, pw_error *error) {
@@ -374,7 +380,9 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
 static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
   int status = sensitivity_open (cmd, error);
-  if (status == PW_OK) status = pw_results_open (&cmd->line, "sensitivity", cmd->line.until == NULL, error);
+  if (status == PW_OK)
+    status = pw_results_open (&cmd->line, &sensitivity_results, cmd->line.until ? NULL : pw_cli_tables, (pw_use){ 0 },
+                              error);
   if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = pw_report_initial_state (&cmd->line.m, cmd->unknowns.limit, error);
   if (status == PW_OK) {
@@ -388,8 +396,7 @@ static int sensitivity_command (void *options, pw_error *error) {
     cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   }
   if (status == PW_OK) sensitivity_print (cmd);
-  if (status == PW_OK) status = pw_results_write (&cmd->line, 5, cmd, sensitivity_csv, sensitivity_json, error);
-  if (status == PW_OK && cmd->line.plots && cmd->outputs.rows > 1) status = sensitivity_draw (cmd, error);
+  if (status == PW_OK) status = pw_results_write (&cmd->line, &sensitivity_results, cmd, error);
   pw_outcomes_close (&cmd->outcomes);
   pw_unknowns_close (&cmd->unknowns);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;

@@ -503,7 +503,9 @@ static void steady_ranges (const pw_steady_command *cmd, double re[2], double im
 }
 
 /* Eigenvalues over the parameter, stable parts solid, unstable ones dashed; below them the root locus. */
-static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
+static int steady_draw (const void *context, pw_error *error) {
+  const pw_steady_command *cmd = context;
+  if (cmd->vary_text == NULL) return PW_OK;
   const double first = fmin (cmd->settings.first, cmd->settings.last),
                last = fmax (cmd->settings.first, cmd->settings.last);
   const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
@@ -556,6 +558,8 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
+static const pw_results steady_results = { "steady", 1, 1, steady_csv, steady_json, steady_draw };
+
 /* Finds steady motions of the model; with --vary branches that begin at the ends of the range or, if there are none,
  * at the value of the model or within the range. */
 static int steady_compute (pw_steady_command *cmd, pw_error *error) {
@@ -582,13 +586,12 @@ static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_results_open (&cmd->line, "steady", 1, error);
+  if (status == PW_OK) status = pw_results_open (&cmd->line, &steady_results, pw_cli_tables, (pw_use){ 0 }, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = steady_compute (cmd, error);
   if (status == PW_OK && cmd->points) {
     steady_print (cmd);
-    status = pw_results_write (&cmd->line, 1, cmd, steady_csv, steady_json, error);
-    if (status == PW_OK && cmd->line.plots && cmd->vary_text) status = steady_draw (cmd, error);
+    status = pw_results_write (&cmd->line, &steady_results, cmd, error);
   }
   steady_forget (cmd, 0);
   free (cmd->point);

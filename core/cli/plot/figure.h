@@ -35,18 +35,30 @@ pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *
 pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error *error);
 
 /* Options of commands whose results are a table, a summary and figures. */
+#define PW_SUMMARY_OPTIONS(json_help, plots_help)                                                    \
+  PW_TEXT_OPTION (pw_cli_line, json, "json", 0, "FILE", json_help " as JSON; - is standard output"), \
+      PW_TEXT_OPTION (pw_cli_line, plots, "plots", 0, "DIR", plots_help " into a folder"), PW_WIDTH_OPTION
 #define PW_RESULTS_OPTIONS(table_help, json_help, plots_help)                                                 \
   PW_TEXT_OPTION (pw_cli_line, table, "output", 'o', "FILE.csv", table_help ", or as FILE.npz or FILE.json"), \
-      PW_TEXT_OPTION (pw_cli_line, json, "json", 0, "FILE", json_help " as JSON; - is standard output"),      \
-      PW_TEXT_OPTION (pw_cli_line, plots, "plots", 0, "DIR", plots_help " into a folder"), PW_WIDTH_OPTION
+      PW_SUMMARY_OPTIONS (json_help, plots_help)
 
-/* Opens what they name.  -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood
- * with a notice.  has_table: 0 if there will be no table.  A status. */
-int pw_results_open (pw_cli_line *line, const char *name, int has_table, pw_error *error);
-/* Writes table and summary, with this value of pw_json.lines.  A status. */
-int pw_results_write (pw_cli_line *line, int lines, const void *context,
-                      int (*csv) (const void *context, FILE *f, pw_error *error),
-                      void (*json) (const void *context, pw_json *j), pw_error *error);
+typedef struct {
+  const char *name; /* of the figures: "steady" */
+  int takes_folder; /* 1: -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood */
+  int lines;        /* pw_json.lines of the summary */
+  /* NULL: the command writes the table itself, to a file that is not opened here */
+  int (*table) (const void *context, FILE *f, pw_error *error);
+  void (*json) (const void *context, pw_json *j);
+  int (*draw) (const void *context, pw_error *error); /* with --plots */
+} pw_results;
+
+/* Opens what they name.  tables: formats of the table; NULL: there will be none.  reads: a file that the command reads,
+ * or without a path.  A status. */
+int pw_results_open (pw_cli_line *line, const pw_results *r, const char *const *tables, pw_use reads, pw_error *error);
+/* Draws figures, then writes table and summary, even if that has failed.  A status. */
+int pw_results_write (pw_cli_line *line, const pw_results *r, const void *context, pw_error *error);
+/* The status in the summary of a search: that of figures, unless it was interrupted or has not converged. */
+const char *pw_results_word (const pw_cli_line *line, int interrupted, int converged);
 
 /* Opens the script NAME.gp; write the variables of its template to it, then end it.  NULL and PW_RESOURCE if it cannot
  * be written. */
@@ -65,8 +77,6 @@ const char *pw_figure_label (const char *name, const char *unit, char buffer[FIG
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
 /* Removes the pictures of an earlier run and reports why none are drawn.  Returns PW_OK. */
 int pw_figure_undrawn (const char *folder, const char *const *names, const char *why);
-/* The status of a command that has drawn, with this status and error, and then completed its files, with `status`. */
-int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *error);
 
 /* ---- Panels of curves (panels.gp) ---- */
 

@@ -1148,6 +1148,7 @@ typedef struct {
   /* as understood */
   pw_plan plan;
   pw_journal journal;
+  pw_tally tally;
   int jobs;
 } pw_sweep;
 
@@ -1204,39 +1205,6 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
                   sweep->part_text);
 }
 
-static int sweep_open (pw_sweep *sweep, pw_error *error) {
-  static const char *const figures[] = { "sweep.dat", "sweep.gp", "sweep.svg", "sweep.png", "sweep.pdf", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", sweep->line.table, PW_WRITES, sweep->part_text ? pw_cli_csv : pw_cli_tables },
-                   { "--json", sweep->line.json, PW_WRITES, pw_cli_json },
-                   { "--plots", sweep->line.plots, PW_WRITES_INTO, figures } };
-  double width;
-  int status = pw_cli_file (&sweep->line, error);
-  if (status == PW_OK) status = sweep_read_settings (sweep, error);
-  if (status == PW_OK) status = pw_cli_check_uses (&sweep->line, use, sizeof use / sizeof *use, error);
-  if (status == PW_OK) status = plan_open (&sweep->plan, sweep->ranges, error);
-  if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
-    status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
-                      sweep->plan.grid.rows);
-  if (status == PW_OK && sweep->line.plots && sweep->plan.grid.axes > 2)
-    status =
-        pw_fail (error, PW_INPUT, "--plots: figures show one or two varied quantities, not %d", sweep->plan.grid.axes);
-  if (status == PW_OK)
-    status = pw_cli_requires ("--width", sweep->line.width, "--plots DIR", sweep->line.plots != NULL, error);
-  if (status == PW_OK) status = pw_figure_width (sweep->line.width, &width, error);
-  use[1].path = NULL; /* the journal stands for it */
-  if (status == PW_OK) status = pw_files_open (&sweep->line, use, sizeof use / sizeof *use, error);
-  const size_t numbers = (size_t)sweep->plan.grid.rows * (size_t)plan_drawn (&sweep->plan);
-  if (status == PW_OK && sweep->line.plots && (sweep->plan.drawn = malloc (numbers * sizeof (double))) == NULL)
-    status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = journal_open (&sweep->journal, &sweep->plan, sweep->line.table, error);
-  if (status != PW_OK) return status;
-  if (sweep->journal.done > 0)
-    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
-                sweep->journal.rows);
-  return PW_OK;
-}
-
 static void sweep_report_failures (const pw_tally *tally) {
   if (tally->failed > 0)
     pw_cli_say ("pinwheel: %ld of %ld runs failed, the first of them: %s\n", tally->failed, tally->rows, tally->reason);
@@ -1275,10 +1243,12 @@ static int draw_by_value (const void *a, const void *b) {
 }
 
 /* Curves over one varied quantity, maps over two. */
-static int sweep_draw (pw_sweep *sweep, pw_error *error) {
+static int sweep_draw (const void *context, pw_error *error) {
+  const pw_sweep *sweep = context;
   const pw_plan *plan = &sweep->plan;
   const pw_axis *axis = plan->grid.axis;
   const int count = plan_drawn (plan), maps = plan->grid.axes == 2;
+  char text[2][FIGURE_TITLE];
   const char *label[2] = { "", "" };
   double range[2][2] = { { INFINITY, -INFINITY }, { INFINITY, -INFINITY } };
   double (*point)[2] = malloc ((size_t)plan->grid.rows * sizeof *point);
@@ -1286,8 +1256,7 @@ static int sweep_draw (pw_sweep *sweep, pw_error *error) {
   if (point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_curves_open (&c, &sweep->line, sweep->line.plots, "sweep", "sweep", error), type = 0;
   for (int k = 0; k <= maps; k++) {
-    label[k] = pw_arena_copy (&sweep->line.arena, PW_FIGURE_LABEL (axis[k].name, axis[k].unit ? axis[k].unit : ""));
-    if (label[k] == NULL && status == PW_OK) status = pw_fail (error, PW_RESOURCE, "out of memory");
+    label[k] = pw_figure_label (axis[k].name, axis[k].unit ? axis[k].unit : "", text[k]);
     if (axis[k].value == NULL && axis[k].range.logarithmic) type |= k ? PW_PANEL_LOG_Y : PW_PANEL_LOG_X;
     for (long i = 0; i < axis[k].count; i++) {
       double end[2] = { pw_axis_value (&axis[k], i), pw_axis_value (&axis[k], i) };
@@ -1320,21 +1289,47 @@ static int sweep_draw (pw_sweep *sweep, pw_error *error) {
   return pw_curves_draw (&c, status, error);
 }
 
-static void sweep_json (const pw_sweep *sweep, const pw_tally *tally, FILE *f) {
-  pw_json j = { .f = f, .lines = 1 };
+static void sweep_json (const void *context, pw_json *j) {
+  const pw_sweep *sweep = context;
+  const pw_tally *tally = &sweep->tally;
   pw_json_print (
-      &j, "{schema: %d, model: %s, method: %s, status: %s, runs: %ld, failed: %ld, reason: %s, table: %s, vary: [", 1,
+      j, "{schema: %d, model: %s, method: %s, status: %s, runs: %ld, failed: %ld, reason: %s, table: %s, vary: [", 1,
       pw_file_name (sweep->line.m.file), sweep->plan.method,
       tally->failed == tally->rows ? pw_cli_status_word (-tally->status) : "ok", tally->rows, tally->failed,
       tally->failed ? tally->reason : "", sweep->line.table);
   for (const pw_axis *axis = sweep->plan.grid.axis; axis < sweep->plan.grid.axis + sweep->plan.grid.axes; axis++)
-    pw_json_print (&j, "{name: %s, values: %s}", axis->name, axis->text);
-  pw_json_print (&j, "]}");
+    pw_json_print (j, "{name: %s, values: %s}", axis->name, axis->text);
+  pw_json_print (j, "]}");
+}
+
+/* The journal stands for the table. */
+static const pw_results sweep_results = { .name = "sweep", .lines = 1, .json = sweep_json, .draw = sweep_draw };
+
+static int sweep_open (pw_sweep *sweep, pw_error *error) {
+  int status = pw_cli_file (&sweep->line, error);
+  if (status == PW_OK) status = sweep_read_settings (sweep, error);
+  if (status == PW_OK)
+    status = pw_results_open (&sweep->line, &sweep_results, sweep->part_text ? pw_cli_csv : pw_cli_tables,
+                              (pw_use){ 0 }, error);
+  if (status == PW_OK) status = plan_open (&sweep->plan, sweep->ranges, error);
+  if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
+    status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
+                      sweep->plan.grid.rows);
+  if (status == PW_OK && sweep->line.plots && sweep->plan.grid.axes > 2)
+    status =
+        pw_fail (error, PW_INPUT, "--plots: figures show one or two varied quantities, not %d", sweep->plan.grid.axes);
+  const size_t numbers = (size_t)sweep->plan.grid.rows * (size_t)plan_drawn (&sweep->plan);
+  if (status == PW_OK && sweep->line.plots && (sweep->plan.drawn = malloc (numbers * sizeof (double))) == NULL)
+    status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = journal_open (&sweep->journal, &sweep->plan, sweep->line.table, error);
+  if (status != PW_OK) return status;
+  if (sweep->journal.done > 0)
+    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
+                sweep->journal.rows);
+  return PW_OK;
 }
 
 static int sweep_finish (pw_sweep *sweep, pw_error *error) {
-  pw_tally tally;
-  pw_error drawing = { 0 };
   if (sweep->journal.done == 0) {
     fputs ("pinwheel: interrupted before the first run was done\n", stderr);
     return PW_INTERRUPTED;
@@ -1344,28 +1339,24 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
                 sweep->journal.done, sweep->journal.rows, sweep->journal.path);
     return PW_INTERRUPTED;
   }
-  int status = table_finish (&sweep->journal, &sweep->plan, &tally, error);
+  int status = table_finish (&sweep->journal, &sweep->plan, &sweep->tally, error);
+  if (status == PW_OK) status = pw_results_write (&sweep->line, &sweep_results, sweep, error);
   if (status != PW_OK) return status;
-  const int drawn = sweep->line.plots ? sweep_draw (sweep, &drawing) : PW_OK;
-  if (pw_files_stream (&sweep->line, 2)) sweep_json (sweep, &tally, pw_files_stream (&sweep->line, 2));
-  status = pw_figure_status (drawn, &drawing, pw_files_finish (&sweep->line, error), error);
-  if (status != PW_OK) return status;
-  if (sweep->plan.parts == 1) return sweep_conclude (&tally, error);
-  sweep_report_failures (&tally); /* whether all have failed is known after the merge */
+  if (sweep->plan.parts == 1) return sweep_conclude (&sweep->tally, error);
+  sweep_report_failures (&sweep->tally); /* whether all have failed is known after the merge */
   return PW_OK;
 }
 
 static int sweep_command (void *options, pw_error *error) {
   pw_sweep *sweep = options;
-  pw_tally tally;
   sweep->journal.descriptor = -1;
   int status = sweep_check_options (sweep, error);
   const char *other = status == PW_OK && sweep->merge ? sweep_not_for_merge (sweep) : NULL;
   if (other)
     status = pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", other);
   if (status == PW_OK && sweep->merge) {
-    status = table_merge_parts (sweep->line.argument, sweep->line.arguments, sweep->line.table, &tally, error);
-    return status == PW_OK ? sweep_conclude (&tally, error) : status;
+    status = table_merge_parts (sweep->line.argument, sweep->line.arguments, sweep->line.table, &sweep->tally, error);
+    return status == PW_OK ? sweep_conclude (&sweep->tally, error) : status;
   }
   if (status == PW_OK) status = sweep_open (sweep, error);
   if (status == PW_OK) status = rows_compute (&sweep->plan, &sweep->journal, sweep->jobs, error);
