@@ -394,6 +394,10 @@ extern const char *const pw_cli_csv[], *const pw_cli_json[], *const pw_cli_table
 /* What to write in place of a number with a unit (pw_number_hint), likewise. */
 #define PW_NUMBER_HINT(text) pw_number_hint (text, (char[PW_HINT]){ 0 }, PW_HINT)
 
+/* The first `size` bytes of a text, at most PW_PART_MOST - 1, likewise. */
+enum { PW_PART_MOST = 200 };
+#define PW_PART(text, size) pw_print_part ((char[PW_PART_MOST]){ 0 }, PW_PART_MOST, text, size)
+
 /* "1 run", "2 runs", likewise. */
 #define PW_COUNTED(count, noun) PW_PRINTED (60, "%ld %s%s", (long)(count), noun, (count) == 1 ? "" : "s")
 
@@ -453,6 +457,9 @@ void pw_text_cell (pw_text *t, const char *text);
 void pw_text_name (pw_text *t, const char *name, const char *unit);
 /* Adds a cell in quotes; line ends in it become blanks. */
 void pw_text_quoted (pw_text *t, const char *text);
+/* Moves *at past a cell, and stores its text, unless it is NULL, without quotes, which are doubled inside; returns what
+ * ends the cell: a comma, the line end or 0. */
+char pw_text_read_cell (const char **at, pw_text *cell);
 /* Writes the text and a line end to a file, and frees the text.  PW_OK, or PW_RESOURCE with the file's folder. */
 int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 

@@ -84,9 +84,7 @@ int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error
   return status;
 }
 
-/* Moves *at past a cell, and stores its text, unless `cell` is NULL, without quotes, which are doubled inside; returns
- * what ends the cell. */
-static char table_cell (const char **at, pw_text *cell) {
+char pw_text_read_cell (const char **at, pw_text *cell) {
   const char *c = *at;
   const int quoted = *c == '"';
   if (cell) pw_text_clear (cell);
@@ -104,8 +102,8 @@ static char table_cell (const char **at, pw_text *cell) {
 static int table_row (const char **at, int k, pw_text *cell, double *value) {
   int quoted = 0;
   char end = ',';
-  for (int c = 0; c <= k && end == ','; c++) quoted = **at == '"', end = table_cell (at, cell);
-  while (end == ',') end = table_cell (at, NULL);
+  for (int c = 0; c <= k && end == ','; c++) quoted = **at == '"', end = pw_text_read_cell (at, cell);
+  while (end == ',') end = pw_text_read_cell (at, NULL);
   *value = NAN;
   return (cell->length && pw_read_number (cell->chars, value) != PW_OK) || quoted;
 }
@@ -158,7 +156,7 @@ static int table_convert (const char *csv, int is_json, FILE *f, pw_error *error
   for (const char *c = rows; *c; c++) count += *c == '\n';
   if (is_json) pw_json_open (&j, NULL, '{');
   for (int k = 0; status == PW_OK && at < rows; k++) {
-    table_cell (&at, &name);
+    pw_text_read_cell (&at, &name);
     char *text = name.chars ? name.chars : "", *unit = strstr (text, " [");
     if (is_json) {
       pw_json_open (&j, text, '[');
@@ -322,7 +320,7 @@ void pw_fingerprint_initial (pw_text *t, const char **starts) {
     const char **later = starts + 1;
     while (*later && strncmp (*later, *starts, n + 1) != 0) later++;
     if (*later) continue;
-    pw_fingerprint_line (t, "start", PW_PRINTED (200, "%.*s", (int)n, *starts), *starts + n + 1);
+    pw_fingerprint_line (t, "start", PW_PART (*starts, n), *starts + n + 1);
   }
 }
 

@@ -95,7 +95,7 @@ static int command_refuse (const pw_command *command, const pw_command *const *a
   if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
   if (code != POPT_ERROR_BADOPT)
     return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
-  pw_nearest near = { .sought = PW_PRINTED (100, "%.*s", (int)strcspn (name, "="), name) };
+  pw_nearest near = { .sought = PW_PART (name, strcspn (name, "=")) };
   for (const struct poptOption *o = line->options; o->longName; o++)
     if (o->descrip) pw_nearest_try (&near, o->longName);
   const char *hint = near.near ? PW_PRINTED (140, "did you mean \"--%s\"?", near.best)
@@ -207,7 +207,7 @@ int pw_cli_range (const char *option, const char *text, pw_range *range, pw_erro
   *range = (pw_range){ .logarithmic = old && begin[1] == 'o' };
   for (const char *c = begin + 4 * old; c && good;) {
     const size_t size = pw_cli_part (c, ':');
-    const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
+    const char *part = PW_PART (c, size);
     pw_number_hint (part, hint, sizeof hint);
     c = c[size] ? c + size + 1 : NULL;
     if (n >= 2 && c == NULL && strcmp (part, "log") == 0)
@@ -257,8 +257,7 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *er
   if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const char *c = axis->text;
   for (long i = 0; i < axis->count; i++, c += pw_cli_part (c, ',') + 1) {
-    const size_t size = pw_cli_part (c, ',');
-    const char *part = PW_PRINTED (100, "%.*s", (int)(size < 99 ? size : 99), c);
+    const char *part = PW_PART (c, pw_cli_part (c, ','));
     if (pw_read_expression (part, &axis->value[i]) != PW_OK || !isfinite (axis->value[i]))
       return axis_fail (axis, PW_PRINTED (240, "\"%s\" is not a finite number%s", part, PW_NUMBER_HINT (part)), error);
   }

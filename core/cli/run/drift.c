@@ -63,7 +63,7 @@ static const pw_study_column drift_columns[] = {
 /* Reads "OPTION=RANGE". */
 static int drift_read_values (pw_drift *drift, const char *text, pw_error *error) {
   char hint[PW_HINT];
-  const char *name = PW_PRINTED (60, "%.*s", (int)strcspn (text, "="), text);
+  const char *name = PW_PART (text, strcspn (text, "="));
   int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
   if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
   pw_axis *axis = &drift->axis[option];

@@ -33,7 +33,7 @@ typedef struct {
   long rows;
 } pw_grid;
 
-#define PW_SWEEP_MAGIC "pinwheel sweep 1\n" /* the first line of a fingerprint */
+#define PW_SWEEP_MAGIC "pinwheel sweep 2\n" /* the first line of a fingerprint */
 
 typedef struct {
   /* from the command line */
@@ -192,15 +192,10 @@ static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *e
     if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
     const char *copy = pw_arena_copy (&plan->arena, name),
                *unit = pw_arena_copy (&plan->arena, pw_system_state_unit (system, state));
-    int status = copy && unit ? PW_OK : PW_RESOURCE;
-    if (status == PW_OK && (size_t)plan->columns == plan->column_room) { /* a larger hash table is filled anew */
-      status = pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column);
-      pw_names_close (&plan->column_of);
-      if (status == PW_OK) status = pw_names_open (&plan->column_of, plan->column_room);
-      for (int k = 0; status == PW_OK && k < plan->columns; k++)
-        pw_names_add (&plan->column_of, plan->column[k].name, k);
-    }
-    if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
+    if (copy == NULL || unit == NULL ||
+        pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column) != PW_OK ||
+        pw_names_reserve (&plan->column_of, plan->column_room) != PW_OK)
+      return pw_fail (error, PW_RESOURCE, "out of memory");
     plan->column[plan->columns] = (struct pw_column){ copy, unit, 1 };
     pw_names_add (&plan->column_of, copy, plan->columns++);
   }
@@ -412,7 +407,7 @@ static void plan_close (pw_plan *plan) {
  * The file of a part, which is written like a table, has the fingerprint and the lines of its journal in the order of
  * the grid.
  *
- *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
+ *     pinwheel sweep 2              the fingerprint: lines "KEY = VALUE"
  *     ...
  *     part = 2/4
  *     end
@@ -451,13 +446,10 @@ typedef struct {
   char *begin, *end;
 } journal_map;
 
-/* FNV-1a (Fowler, Noll, Vo) of a row's number, status and text. */
-static uint32_t journal_line_checksum (long row, int status, const char *text, size_t size) {
-  uint32_t h = 2166136261u;
-  for (int i = 0; i < 32; i += 8) h = (h ^ (((uint32_t)row >> i) & 255)) * 16777619u;
-  h = (h ^ (uint32_t)status) * 16777619u;
-  for (size_t i = 0; i < size; i++) h = (h ^ (unsigned char)text[i]) * 16777619u;
-  return h;
+/* Of a row's number, status and text. */
+static unsigned long journal_checksum (long row, int status, const char *text, size_t size) {
+  const char *front = PW_PRINTED (40, "%ld %d ", row, status);
+  return pw_check_sum (pw_check_sum (PW_CHECK, front, strlen (front)), text, size) & 0xffffffff;
 }
 
 /* Reads the line that begins here; 0 if it is incomplete or damaged. */
@@ -473,7 +465,7 @@ static int journal_line_read (const char *begin, const char *end, journal_line *
   line->text_size = (size_t)(newline + 1 - line->text);
   line->line_size = (size_t)(newline + 1 - begin);
   return line->row >= 0 && line->status >= 0 && line->status <= 4 &&
-         journal_line_checksum (line->row, line->status, line->text, line->text_size - 1) == (uint32_t)checksum;
+         journal_checksum (line->row, line->status, line->text, line->text_size - 1) == checksum;
 }
 
 static int journal_map_open (journal_map *map, int descriptor) {
@@ -574,9 +566,9 @@ static int journal_open (pw_journal *journal, const pw_plan *plan, const char *p
 static int journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text,
                         pw_error *error) {
   const off_t at = journal->size;
-  const uint32_t checksum = journal_line_checksum (row, status, text, strlen (text));
+  const unsigned long checksum = journal_checksum (row, status, text, strlen (text));
   pw_text_clear (&journal->line);
-  pw_text_add (&journal->line, PW_PRINTED (60, "%ld %d %08lx ", row, status, (unsigned long)checksum));
+  pw_text_add (&journal->line, PW_PRINTED (60, "%ld %d %08lx ", row, status, checksum));
   pw_text_add (&journal->line, text);
   pw_text_add (&journal->line, "\n");
   if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -603,15 +595,10 @@ static int table_read_row (const char *at, const char *end, long row, journal_li
   tally->rows++;
   if (line->status == 0 || tally->failed++ > 0) return 1;
   tally->status = line->status;
-  /* the reason is the last cell and the only one in quotes, which are doubled inside */
-  const char *c = line->text, *last = line->text + line->text_size - 2;
-  while (c < last && !(c[0] == ',' && c[1] == '"')) c++;
-  size_t n = 0;
-  for (c += 2; c < last && n + 1 < sizeof tally->reason; c++) {
-    tally->reason[n++] = *c;
-    if (*c == '"') c++;
-  }
-  tally->reason[n] = 0;
+  pw_text reason = { .chars = NULL }; /* the last cell */
+  for (const char *c = line->text; pw_text_read_cell (&c, &reason) == ',';) continue;
+  snprintf (tally->reason, sizeof tally->reason, "%s", reason.chars ? reason.chars : "");
+  pw_text_free (&reason);
   return 1;
 }
 
@@ -643,9 +630,9 @@ static void table_keep (const pw_plan *plan, long row, const char *line) {
   const int count = plan_drawn (plan);
   for (int i = 0; i < count; i++) {
     const char *cell = line;
-    for (int k = table_cell_of (plan, i); k > 0; k--) cell += strcspn (cell, ",") + 1;
     double *value = &plan->drawn[row * count + i];
-    if (pw_read_number (PW_PRINTED (60, "%.*s", (int)strcspn (cell, ","), cell), value) != PW_OK) *value = NAN;
+    for (int k = table_cell_of (plan, i); k > 0; k--) pw_text_read_cell (&cell, NULL);
+    if (pw_read_number (PW_PART (cell, strcspn (cell, ",")), value) != PW_OK) *value = NAN;
   }
 }
 
