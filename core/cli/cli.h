@@ -353,6 +353,22 @@ void pw_cli_engine_close (pw_cli_engine *e);
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);
 
+/* ---- Cells of the lines of a CSV table; errors of writing are those of the stream ---- */
+
+typedef struct {
+  FILE *f;
+  int cells; /* in the line so far */
+} pw_cells;
+
+void pw_cells_number (pw_cells *c, double value); /* by pw_format; nan if not finite */
+void pw_cells_text (pw_cells *c, const char *text);
+/* The cell "NAME [UNIT]", in quotes if the name has a comma; no unit if it is NULL or "".  Line ends in the name become
+ * blanks. */
+void pw_cells_name (pw_cells *c, const char *name, const char *unit);
+/* A cell in quotes; line ends in it become blanks. */
+void pw_cells_quoted (pw_cells *c, const char *text);
+void pw_cells_end (pw_cells *c);
+
 /* ---- Files ---- */
 
 /* First entry of the list of files passed to pw_cli_check_uses, which fills in the path. */
@@ -375,11 +391,10 @@ FILE *pw_files_stream (const pw_cli_line *line, int i); /* NULL: not requested *
 /* Completes all of them (pw_output_finish_all). */
 int pw_files_finish (pw_cli_line *line, pw_error *error);
 
-/* Writes the table that `csv` writes to a file in the format that the ending of its path states: .csv; .npz, a NumPy
- * archive with a vector of each column, named without unit; or .json, an object with a list of each column.  Statuses
- * of csv, PW_RESOURCE. */
+/* Writes the table of `table` to a file in the format that the ending of its path states: .csv; .npz, a NumPy archive
+ * with a vector of each column, named without unit; or .json, an object with a list of each column.  PW_RESOURCE. */
 int pw_cli_write_table (const char *path, FILE *f, const void *context,
-                        int (*csv) (const void *context, FILE *f, pw_error *error), pw_error *error);
+                        void (*table) (const void *context, pw_cells *c), pw_error *error);
 /* Whether a name ends as that of a file: ".csv", ".png", ... */
 int pw_cli_names_file (const char *path);
 /* Refuses a file in a format that is not written, and a new folder with the name of a file.  A status. */
@@ -435,39 +450,9 @@ int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *erro
  * none or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *run);
 
-/* ---- Strings of variable length, and the cells of a line of a CSV table ---- */
-
-/* A string; zero-initialised, it is empty. */
-typedef struct {
-  char *chars;   /* zero-terminated; NULL before anything is added */
-  size_t length; /* bytes, without the terminating zero */
-  size_t room;   /* bytes allocated */
-  int failed;    /* 1: out of memory, so that text is missing */
-} pw_text;
-
-void pw_text_clear (pw_text *t);
-void pw_text_free (pw_text *t);
-void pw_text_add (pw_text *t, const char *text);
-void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
-/* Add a cell, after a comma unless it is the first of its line: a number by pw_format, nan if not finite; or text. */
-void pw_text_number (pw_text *t, double value);
-void pw_text_cell (pw_text *t, const char *text);
-/* Adds the cell "NAME [UNIT]", in quotes if the name has a comma; no unit if it is NULL or "".  Line ends in the name
- * become blanks. */
-void pw_text_name (pw_text *t, const char *name, const char *unit);
-/* Adds a cell in quotes; line ends in it become blanks. */
-void pw_text_quoted (pw_text *t, const char *text);
-/* Moves *at past a cell, and stores its text, unless it is NULL, without quotes, which are doubled inside; returns what
- * ends the cell: a comma, the line end or 0. */
-char pw_text_read_cell (const char **at, pw_text *cell);
-/* Writes the text and a line end to a file, and frees the text.  PW_OK, or PW_RESOURCE with the file's folder. */
-int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
-
 /* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and
  * the path is "". */
 void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size);
-/* Closes a table that was written with this status: with PW_OK as NAME, else as NAME.part, and says so.  A status. */
-int pw_cli_close_table (pw_output *o, int status, pw_error *error);
 
 /* ---- Fingerprints of checkpoints and journals of sweeps ----
  *
@@ -475,19 +460,19 @@ int pw_cli_close_table (pw_output *o, int status, pw_error *error);
  * results of a run or a sweep, and a line "end": so results of different runs are never mixed. */
 
 /* Adds the line "KEY NAME = VALUE", where the key is that of a list of values; or, if `name` is NULL, "KEY = VALUE". */
-void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value);
-void pw_fingerprint_number (pw_text *t, const char *key, const char *name, double value);
+void pw_fingerprint_line (FILE *f, const char *key, const char *name, const char *value);
+void pw_fingerprint_number (FILE *f, const char *key, const char *name, double value);
 /* Adds a line with the name of a file and a checksum of its contents.  PW_INPUT or PW_RESOURCE if it cannot be read. */
-int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
+int pw_fingerprint_file (FILE *f, const char *key, const char *name, const char *path, pw_error *error);
 /* Adds the first lines of the fingerprint of a run or sweep: `magic`, version, model, the checksum of its tables
  * (pw_fingerprint_tables) unless it is 0, files of methods, method, span, step and tolerances.  Errors as of
  * pw_fingerprint_file. */
-int pw_fingerprint_run (pw_text *t, const char *magic, const pw_cli_line *line, uint64_t table_sum, const char *method,
+int pw_fingerprint_run (FILE *f, const char *magic, const pw_cli_line *line, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error);
 /* Continues a checksum, 0 at first, with the tables in the signals of a model, and the points of its paths. */
 uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);
 /* Adds a line for each state of a list of "STATE=VALUE", its last value; the list ends with NULL, or is NULL. */
-void pw_fingerprint_initial (pw_text *t, const char **starts);
+void pw_fingerprint_initial (FILE *f, const char **starts);
 
 /* The end of the fingerprint at the beginning of a text; NULL if it is incomplete or its first line is not `magic`. */
 const char *pw_fingerprint_end (const char *magic, const char *at, const char *end);

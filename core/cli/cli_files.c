@@ -84,37 +84,79 @@ int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error
   return status;
 }
 
-char pw_text_read_cell (const char **at, pw_text *cell) {
-  const char *c = *at;
-  const int quoted = *c == '"';
-  if (cell) pw_text_clear (cell);
-  for (c += quoted; *c && (quoted || (*c != ',' && *c != '\n')); c++) {
-    if (quoted && *c == '"' && *++c != '"') break;
-    if (cell) pw_text_add_bytes (cell, c, 1);
+static void cells_next (pw_cells *c) {
+  if (c->cells++) fputc (',', c->f);
+}
+
+void pw_cells_text (pw_cells *c, const char *text) {
+  cells_next (c);
+  fputs (text, c->f);
+}
+
+void pw_cells_number (pw_cells *c, double value) {
+  pw_cells_text (c, isfinite (value) ? PW_DIGITS (value, 17) : "nan");
+}
+
+/* Line ends become blanks; between quotes, a quote in the text is doubled. */
+static void cells_write (FILE *f, const char *text, int between_quotes) {
+  for (; *text; text++) {
+    if (between_quotes && *text == '"') fputc ('"', f);
+    fputc (*text == '\n' || *text == '\r' ? ' ' : *text, f);
   }
-  const char end = *c;
-  *at = c + (end != 0);
-  return end;
 }
 
-/* Moves *at past a row, and stores its cell k and the number in it, else NaN; returns 1 if it is a text: in quotes, or
- * neither a number nor empty. */
-static int table_row (const char **at, int k, pw_text *cell, double *value) {
-  int quoted = 0;
-  char end = ',';
-  for (int c = 0; c <= k && end == ','; c++) quoted = **at == '"', end = pw_text_read_cell (at, cell);
-  while (end == ',') end = pw_text_read_cell (at, NULL);
+void pw_cells_name (pw_cells *c, const char *name, const char *unit) {
+  const char *quote = strchr (name, ',') ? "\"" : "";
+  pw_cells_text (c, quote);
+  cells_write (c->f, name, *quote != 0);
+  fprintf (c->f, unit && *unit ? " [%s]%s" : "%s%s", unit && *unit ? unit : "", quote);
+}
+
+void pw_cells_quoted (pw_cells *c, const char *text) {
+  pw_cells_text (c, "\"");
+  cells_write (c->f, text, 1);
+  fputc ('"', c->f);
+}
+
+void pw_cells_end (pw_cells *c) {
+  fputc ('\n', c->f);
+  c->cells = 0;
+}
+
+/* The cells of a table, line by line: their texts; one in quotes begins with a quote. */
+typedef struct {
+  char **cell;
+  long rows; /* after the heading */
+  int columns;
+} table_cells;
+
+/* Finds the cells, which end with 0 from now on.  Free them.  PW_OK or PW_RESOURCE. */
+static int table_split (table_cells *t, char *csv) {
+  size_t most = 0, count = 0;
+  for (const char *c = csv; *c; c++) most += *c == ',' || *c == '\n';
+  *t = (table_cells){ .cell = malloc ((most + 1) * sizeof *t->cell) };
+  if (t->cell == NULL) return PW_RESOURCE;
+  for (char *c = csv, *to, end; *c; *to = 0) {
+    const int quoted = *c == '"';
+    t->cell[count++] = to = c;
+    for (c += quoted, to += quoted; *c && (quoted || (*c != ',' && *c != '\n')); *to++ = *c++)
+      if (quoted && *c == '"' && *++c != '"') break; /* quotes inside are doubled */
+    end = *c;
+    c += end != 0;
+    if (end == '\n' && t->columns == 0) t->columns = (int)count;
+  }
+  t->rows = t->columns ? (long)count / t->columns - 1 : 0;
+  return PW_OK;
+}
+
+/* Cell k of a row, -1: of the heading, without quotes.  *value: the number in it, else NaN; *is_text: 1 if it is in
+ * quotes, or neither a number nor empty. */
+static const char *table_cell (const table_cells *t, long row, int k, double *value, int *is_text) {
+  const char *cell = t->cell[(row + 1) * t->columns + k];
+  const int quoted = *cell == '"';
   *value = NAN;
-  return (cell->length && pw_read_number (cell->chars, value) != PW_OK) || quoted;
-}
-
-static void table_json (const char *rows, int k, pw_json *j, pw_text *cell) {
-  double value;
-  for (const char *at = rows; *at;)
-    if (table_row (&at, k, cell, &value) && cell->length)
-      pw_json_text (j, NULL, cell->chars);
-    else
-      pw_json_number (j, NULL, value);
+  *is_text = (cell[quoted] && pw_read_number (cell + quoted, value) != PW_OK) || quoted;
+  return cell + quoted;
 }
 
 /* Stores the characters of a text in UTF-8. */
@@ -125,67 +167,71 @@ static void table_characters (const char *text, uint32_t *to) {
   }
 }
 
-/* Adds column k of a table without its heading to an archive: numbers, NaN for empty cells; or if a cell is a text,
- * texts.  PW_OK or PW_RESOURCE. */
-static int table_npz (const char *rows, long count, int k, const char *name, pw_npz *z, pw_text *cell) {
-  double *value = malloc (((size_t)count + 1) * sizeof *value), *next = value;
+/* Adds column k to an archive: numbers, NaN for empty cells; or if a cell is a text, texts.  PW_OK or PW_RESOURCE. */
+static int table_npz (const table_cells *t, int k, const char *name, pw_npz *z) {
+  double *value = malloc (((size_t)t->rows + 1) * sizeof *value);
   size_t width = 1; /* bytes of the longest text */
-  int texts = 0;
-  for (const char *at = rows; value && *at; next++) {
-    texts |= table_row (&at, k, cell, next);
-    if (cell->length > width) width = cell->length;
+  int texts = 0, is_text;
+  for (long i = 0; value && i < t->rows; i++) {
+    const size_t length = strlen (table_cell (t, i, k, &value[i], &is_text));
+    texts |= is_text;
+    if (length > width) width = length;
   }
-  if (value && !texts) pw_npz_add (z, name, count, -1, 1, value);
-  uint32_t *text = texts ? calloc ((size_t)count * width, sizeof *text) : NULL, *to = text;
-  for (const char *at = rows; text && *at; to += width)
-    if (table_row (&at, k, cell, value) || cell->length) table_characters (cell->chars, to);
-  if (text) pw_npz_add_texts (z, name, count, (int)width, text);
+  if (value && !texts) pw_npz_add (z, name, t->rows, -1, 1, value);
+  uint32_t *text = texts ? calloc ((size_t)t->rows * width, sizeof *text) : NULL;
+  for (long i = 0; text && i < t->rows; i++)
+    table_characters (table_cell (t, i, k, value, &is_text), text + (size_t)i * width);
+  if (text) pw_npz_add_texts (z, name, t->rows, (int)width, text);
   const int status = value && (text || !texts) ? PW_OK : PW_RESOURCE;
   free (value);
   free (text);
   return status;
 }
 
-static int table_convert (const char *csv, int is_json, FILE *f, pw_error *error) {
-  const char *rows = strchr (csv, '\n') ? strchr (csv, '\n') + 1 : "", *at = csv;
-  pw_text name = { .chars = NULL }, cell = { .chars = NULL };
-  pw_npz z = { .f = f };
+static void table_json (const table_cells *t, FILE *f) {
   pw_json j = { .f = f, .lines = 1 };
-  long count = 0;
-  int status = PW_OK;
-  for (const char *c = rows; *c; c++) count += *c == '\n';
-  if (is_json) pw_json_open (&j, NULL, '{');
-  for (int k = 0; status == PW_OK && at < rows; k++) {
-    pw_text_read_cell (&at, &name);
-    char *text = name.chars ? name.chars : "", *unit = strstr (text, " [");
-    if (is_json) {
-      pw_json_open (&j, text, '[');
-      table_json (rows, k, &j, &cell);
-      pw_json_close (&j, ']');
-    } else {
-      if (unit) *unit = 0;
-      status = table_npz (rows, count, k, text, &z, &cell);
+  double value;
+  int is_text;
+  pw_json_open (&j, NULL, '{');
+  for (int k = 0; k < t->columns; k++) {
+    pw_json_open (&j, table_cell (t, -1, k, &value, &is_text), '[');
+    for (long i = 0; i < t->rows; i++) {
+      const char *cell = table_cell (t, i, k, &value, &is_text);
+      is_text &&*cell ? pw_json_text (&j, NULL, cell) : pw_json_number (&j, NULL, value);
     }
+    pw_json_close (&j, ']');
   }
-  if (is_json) pw_json_close (&j, '}');
-  if (name.failed || cell.failed) status = PW_RESOURCE;
-  pw_text_free (&name);
-  pw_text_free (&cell);
+  pw_json_close (&j, '}');
+}
+
+static int table_convert (char *csv, int is_json, FILE *f, pw_error *error) {
+  table_cells t;
+  pw_npz z = { .f = f };
+  int status = table_split (&t, csv);
+  for (int k = 0; status == PW_OK && k < t.columns && !is_json; k++) {
+    char *name = t.cell[k] + (*t.cell[k] == '"'), *unit = strstr (name, " [");
+    if (unit) *unit = 0;
+    status = table_npz (&t, k, name, &z);
+  }
+  if (status == PW_OK && is_json) table_json (&t, f);
   const int ended = is_json ? PW_OK : pw_npz_end (&z, error);
+  free (t.cell);
   return status == PW_OK ? ended : pw_fail (error, status, "out of memory");
 }
 
 int pw_cli_write_table (const char *path, FILE *f, const void *context,
-                        int (*csv) (const void *context, FILE *f, pw_error *error), pw_error *error) {
+                        void (*table) (const void *context, pw_cells *c), pw_error *error) {
   const char *ending = files_format (path);
   const int is_npz = ending && strcasecmp (ending, ".npz") == 0, is_json = ending && strcasecmp (ending, ".json") == 0;
-  if (!is_npz && !is_json) return csv (context, f, error);
+  if (!is_npz && !is_json) {
+    table (context, &(pw_cells){ .f = f });
+    return ferror (f) ? pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno)) : PW_OK;
+  }
   pw_stream text;
   FILE *memory = pw_stream_open (&text);
-  int status = memory ? csv (context, memory, error) : PW_OK;
-  if (pw_stream_close (memory, &text) != PW_OK && status == PW_OK)
-    status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = table_convert (text.text, is_json, f, error);
+  if (memory) table (context, &(pw_cells){ .f = memory });
+  int status = pw_stream_close (memory, &text) == PW_OK ? table_convert (text.text, is_json, f, error)
+                                                        : pw_fail (error, PW_RESOURCE, "out of memory");
   free (text.text);
   return status;
 }
@@ -250,47 +296,44 @@ int pw_files_finish (pw_cli_line *line, pw_error *error) {
   return status;
 }
 
-void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value) {
-  pw_text_add (t, key);
-  if (name) pw_text_add (t, " "), pw_text_add (t, name);
-  pw_text_add (t, " = ");
-  for (; *value; value++) pw_text_add_bytes (t, *value == '\n' ? " " : value, 1); /* an entry has one line */
-  pw_text_add (t, "\n");
+void pw_fingerprint_line (FILE *f, const char *key, const char *name, const char *value) {
+  fprintf (f, "%s%s%s = ", key, name ? " " : "", name ? name : "");
+  for (; *value; value++) fputc (*value == '\n' ? ' ' : *value, f); /* an entry has one line */
+  fputc ('\n', f);
 }
 
-void pw_fingerprint_number (pw_text *t, const char *key, const char *name, double value) {
-  char number[32];
-  pw_fingerprint_line (t, key, name, pw_format (number, value, 17));
+void pw_fingerprint_number (FILE *f, const char *key, const char *name, double value) {
+  pw_fingerprint_line (f, key, name, PW_DIGITS (value, 17));
 }
 
-int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
+int pw_fingerprint_file (FILE *f, const char *key, const char *name, const char *path, pw_error *error) {
   char block[4096];
   uint64_t sum = PW_CHECK;
   const char *reason;
-  FILE *f = pw_open_input (path, &reason);
-  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot read %s: %s", path, reason);
-  for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) sum = pw_check_sum (sum, block, n);
-  int code = ferror (f) ? errno : 0;
-  fclose (f);
+  FILE *in = pw_open_input (path, &reason);
+  if (in == NULL) return pw_fail (error, pw_open_input_status (), "cannot read %s: %s", path, reason);
+  for (size_t n; (n = fread (block, 1, sizeof block, in)) > 0;) sum = pw_check_sum (sum, block, n);
+  int code = ferror (in) ? errno : 0;
+  fclose (in);
   if (code) return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", path, strerror (code));
-  pw_fingerprint_line (t, key, NULL, PW_PRINTED (200, "%.150s, contents %016llx", name, (unsigned long long)sum));
+  pw_fingerprint_line (f, key, NULL, PW_PRINTED (200, "%.150s, contents %016llx", name, (unsigned long long)sum));
   return PW_OK;
 }
 
-int pw_fingerprint_run (pw_text *t, const char *magic, const pw_cli_line *line, uint64_t table_sum, const char *method,
+int pw_fingerprint_run (FILE *f, const char *magic, const pw_cli_line *line, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error) {
-  pw_text_add (t, magic);
-  pw_fingerprint_line (t, "version", NULL, PW_VERSION);
-  int status = pw_fingerprint_file (t, "model", pw_file_name (line->m.file), pw_file_path (line->m.file), error);
-  for (pw_file *const *f = line->method_file; status == PW_OK && f && *f; f++)
-    status = pw_fingerprint_file (t, "method-file", pw_file_name (*f), pw_file_path (*f), error);
+  fputs (magic, f);
+  pw_fingerprint_line (f, "version", NULL, PW_VERSION);
+  int status = pw_fingerprint_file (f, "model", pw_file_name (line->m.file), pw_file_path (line->m.file), error);
+  for (pw_file *const *m = line->method_file; status == PW_OK && m && *m; m++)
+    status = pw_fingerprint_file (f, "method-file", pw_file_name (*m), pw_file_path (*m), error);
   if (table_sum)
-    pw_fingerprint_line (t, "tables", NULL, PW_PRINTED (40, "contents %016llx", (unsigned long long)table_sum));
-  pw_fingerprint_line (t, "method", NULL, method);
-  pw_fingerprint_number (t, "t-end", NULL, settings->span);
-  pw_fingerprint_number (t, "step", NULL, settings->step);
-  pw_fingerprint_number (t, "rtol", NULL, settings->rtol);
-  pw_fingerprint_number (t, "atol", NULL, settings->atol);
+    pw_fingerprint_line (f, "tables", NULL, PW_PRINTED (40, "contents %016llx", (unsigned long long)table_sum));
+  pw_fingerprint_line (f, "method", NULL, method);
+  pw_fingerprint_number (f, "t-end", NULL, settings->span);
+  pw_fingerprint_number (f, "step", NULL, settings->step);
+  pw_fingerprint_number (f, "rtol", NULL, settings->rtol);
+  pw_fingerprint_number (f, "atol", NULL, settings->atol);
   return status;
 }
 
@@ -314,13 +357,13 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m) {
   return sum;
 }
 
-void pw_fingerprint_initial (pw_text *t, const char **starts) {
+void pw_fingerprint_initial (FILE *f, const char **starts) {
   for (; starts && *starts; starts++) {
     size_t n = strcspn (*starts, "=");
     const char **later = starts + 1;
     while (*later && strncmp (*later, *starts, n + 1) != 0) later++;
     if (*later) continue;
-    pw_fingerprint_line (t, "start", PW_PART (*starts, n), *starts + n + 1);
+    pw_fingerprint_line (f, "start", PW_PART (*starts, n), *starts + n + 1);
   }
 }
 

@@ -1,4 +1,4 @@
-/* Messages and printed tables, the progress of long work, strings, requests to stop and limits of processor time. */
+/* Messages and printed tables, the progress of long work, requests to stop and limits of processor time. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <errno.h>
 #include <math.h>
@@ -169,85 +169,12 @@ void pw_progress_end (pw_progress *p) {
   p->drawn = 0;
 }
 
-void pw_text_clear (pw_text *t) {
-  t->length = 0;
-  t->failed = 0;
-  if (t->chars) *t->chars = 0;
-}
-
-void pw_text_free (pw_text *t) {
-  free (t->chars);
-  *t = (pw_text){ .chars = NULL };
-}
-
-void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count) {
-  if (pw_grow (&t->chars, t->length + count, &t->room, 1) != PW_OK) {
-    t->failed = 1;
-    return;
-  }
-  memcpy (t->chars + t->length, bytes, count);
-  t->length += count;
-  t->chars[t->length] = 0;
-}
-
-void pw_text_add (pw_text *t, const char *text) {
-  pw_text_add_bytes (t, text, strlen (text));
-}
-
-void pw_text_cell (pw_text *t, const char *text) {
-  if (t->length) pw_text_add (t, ",");
-  pw_text_add (t, text);
-}
-
-void pw_text_number (pw_text *t, double value) {
-  pw_text_cell (t, isfinite (value) ? PW_DIGITS (value, 17) : "nan");
-}
-
-/* Adds a text, whose line ends become blanks; between quotes, a quote in it is doubled. */
-static void text_add_in_line (pw_text *t, const char *text, int between_quotes) {
-  for (; *text; text++) {
-    if (between_quotes && *text == '"') pw_text_add (t, "\"");
-    pw_text_add_bytes (t, *text == '\n' || *text == '\r' ? " " : text, 1);
-  }
-}
-
-void pw_text_name (pw_text *t, const char *name, const char *unit) {
-  const char *quote = strchr (name, ',') ? "\"" : "";
-  pw_text_cell (t, quote);
-  text_add_in_line (t, name, *quote != 0);
-  if (unit && *unit) pw_text_add (t, " ["), pw_text_add (t, unit), pw_text_add (t, "]");
-  pw_text_add (t, quote);
-}
-
-void pw_text_quoted (pw_text *t, const char *text) {
-  pw_text_cell (t, "\"");
-  text_add_in_line (t, text, 1);
-  pw_text_add (t, "\"");
-}
-
-int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error) {
-  pw_text_add (t, "\n");
-  int failed = t->failed, not_written = !failed && (fputs (t->chars, f) < 0 || fflush (f) != 0);
-  pw_text_free (t);
-  if (failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (not_written) return pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", folder, strerror (errno));
-  return PW_OK;
-}
-
 void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size) {
   *part = 0;
   if (rows > 0)
     pw_output_abandon (o, part, size);
   else
     pw_output_discard (o);
-}
-
-int pw_cli_close_table (pw_output *o, int status, pw_error *error) {
-  char part[4200];
-  if (status == PW_OK) return pw_output_finish (o, error);
-  pw_output_abandon (o, part, sizeof part);
-  pw_cli_say ("pinwheel: the table so far is kept in %s\n", part);
-  return status;
 }
 
 _Static_assert(ATOMIC_INT_LOCK_FREE == 2, "a handler of signals may change only atomic objects without a lock");

@@ -909,27 +909,25 @@ static void fit_json (const void *context, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-static int fit_table (const void *context, FILE *f, pw_error *error) {
+static void fit_table (const void *context, pw_cells *t) {
   const pw_fit *fit = context;
   static const char *const part[] = { "", ".model", ".residual", ".sigma" };
-  pw_text t = { .chars = NULL };
-  if (fit->timed) pw_text_name (&t, "t", "s");
+  if (fit->timed) pw_cells_name (t, "t", "s");
   for (int i = 0; i < fit->columns; i++)
     for (int k = 0; k < 4; k++)
-      pw_text_name (&t, PW_PRINTED (300, "%s%s", fit->column_name[i], part[k]), fit->column_unit[i]);
-  int status = pw_text_line (&t, f, fit->line.table, error);
-  for (int row = 0; row < fit->rows && status == PW_OK; row++) {
-    if (fit->timed) pw_text_number (&t, fit->t[row]);
+      pw_cells_name (t, PW_PRINTED (300, "%s%s", fit->column_name[i], part[k]), fit->column_unit[i]);
+  pw_cells_end (t);
+  for (int row = 0; row < fit->rows; row++) {
+    if (fit->timed) pw_cells_number (t, fit->t[row]);
     for (int i = 0; i < fit->columns; i++) {
       int k = i * fit->rows + row,
           known = !isnan (fit->data[k]) || (fit->column_kind[i] == FIT_ALONG && row < fit->timed);
       const double value[] = { fit->data[k], known ? fit->fitted[k] : NAN, fit->fitted[k] - fit->data[k],
                                fit->weighted && known ? fit->sigma[k] : NAN };
-      for (int c = 0; c < 4; c++) pw_text_number (&t, value[c]);
+      for (int c = 0; c < 4; c++) pw_cells_number (t, value[c]);
     }
-    status = pw_text_line (&t, f, fit->line.table, error);
+    pw_cells_end (t);
   }
-  return status;
 }
 
 /* Data and model of each column along the run, below them the residuals. */

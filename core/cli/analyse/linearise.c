@@ -303,25 +303,24 @@ static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-static int linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
+static void linearise_csv (const void *context, pw_cells *t) {
+  const pw_linearise_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
   int n = cmd->linear.unknowns, rows = n + cmd->outputs, columns = n + cmd->inputs;
-  pw_text t = { .chars = NULL };
-  pw_text_cell (&t, "row");
-  for (int c = 0; c < n; c++) pw_text_name (&t, PW_PRINTED (40, "x%d", c + 1), "m");
+  pw_cells_text (t, "row");
+  for (int c = 0; c < n; c++) pw_cells_name (t, PW_PRINTED (40, "x%d", c + 1), "m");
   for (int c = 0; c < cmd->inputs; c++)
-    pw_text_name (&t, PW_NAME (pw_system_signal_name, s, cmd->input[c]), pw_system_signal_unit (s, cmd->input[c]));
-  int status = pw_text_line (&t, f, cmd->name, error);
-  for (int i = 0; status == PW_OK && i < rows; i++) {
+    pw_cells_name (t, PW_NAME (pw_system_signal_name, s, cmd->input[c]), pw_system_signal_unit (s, cmd->input[c]));
+  pw_cells_end (t);
+  for (int i = 0; i < rows; i++) {
     if (i < n)
-      pw_text_name (&t, PW_PRINTED (40, "x%d'", i + 1), "m/s");
+      pw_cells_name (t, PW_PRINTED (40, "x%d'", i + 1), "m/s");
     else
-      pw_text_name (&t, PW_NAME (pw_system_state_name, s, cmd->output[i - n]),
-                    pw_system_state_unit (s, cmd->output[i - n]));
-    for (int c = 0; c < columns; c++) pw_text_number (&t, linearise_entry (cmd, i, c));
-    status = pw_text_line (&t, f, cmd->name, error);
+      pw_cells_name (t, PW_NAME (pw_system_state_name, s, cmd->output[i - n]),
+                     pw_system_state_unit (s, cmd->output[i - n]));
+    for (int c = 0; c < columns; c++) pw_cells_number (t, linearise_entry (cmd, i, c));
+    pw_cells_end (t);
   }
-  return status;
 }
 
 static int linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
@@ -481,7 +480,7 @@ static int linearise_command (void *options, pw_error *error) {
   FILE *json = pw_files_stream (&cmd->line, LINEARISE_JSON), *csv = pw_files_stream (&cmd->line, LINEARISE_CSV),
        *npz = pw_files_stream (&cmd->line, LINEARISE_NPZ);
   if (status == PW_OK && json) linearise_json (cmd, &(pw_json){ .f = json, .lines = 1 });
-  if (status == PW_OK && csv) status = linearise_csv (cmd, csv, error);
+  if (status == PW_OK && csv) linearise_csv (cmd, &(pw_cells){ .f = csv });
   if (status == PW_OK && npz) status = linearise_npz (cmd, npz, error);
   if (status == PW_OK && cmd->page_path)
     status = linearise_page (cmd, pw_files_stream (&cmd->line, LINEARISE_PAGE), error);

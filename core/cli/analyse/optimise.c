@@ -642,11 +642,11 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
   fprintf (f, " %s\n", values);
 }
 
-static int optimise_yaml (const void *context, FILE *f, pw_error *error) {
+static void optimise_yaml (const void *context, pw_cells *result) {
   const pw_optimise *problem = context;
+  FILE *f = result->f;
   char values[PW_UNKNOWNS_OPTIONS];
   const pw_search *best = problem->best;
-  (void)error; /* of writing: reported when the file is completed */
   if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
   if (problem->incomplete)
@@ -663,7 +663,6 @@ static int optimise_yaml (const void *context, FILE *f, pw_error *error) {
       first = 0;
       fprintf (f, "  %s: %.17g\n", problem->unknowns.list[i].name, best->to[i]);
     }
-  return PW_OK;
 }
 
 /* The objective of every run against each unknown, the best one marked. */

@@ -333,29 +333,27 @@ static void periodic_json (const void *context, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-static int periodic_csv (const void *context, FILE *f, pw_error *error) {
+static void periodic_csv (const void *context, pw_cells *t) {
   const pw_periodic_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
   int states = 2 * pw_system_coordinates (s), multipliers = cmd->point->orbit.multipliers; /* of every point */
-  pw_text t = { .chars = NULL };
-  pw_text_name (&t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
-  pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
-  pw_states_header (s, &t);
-  pw_complex_header (&t, multipliers, "");
-  int status = pw_text_line (&t, f, cmd->line.table, error);
-  for (const pw_periodic_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
+  pw_cells_name (t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
+  pw_cells_text (t, "event,period [s],displacement [m],rotation [rad],growing,residual");
+  pw_states_header (s, t);
+  pw_complex_header (t, multipliers, "");
+  pw_cells_end (t);
+  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
     const pw_periodic_orbit *o = &p->orbit;
     const periodic_displacement d = periodic_displace (o);
-    pw_text_number (&t, cmd->vary_text ? o->parameter : NAN);
-    pw_text_cell (&t, periodic_events[o->event]);
+    pw_cells_number (t, cmd->vary_text ? o->parameter : NAN);
+    pw_cells_text (t, periodic_events[o->event]);
     const double number[] = { o->period, d.total, o->rotation, o->unstable, o->residual };
-    for (int k = 0; k < 5; k++) pw_text_number (&t, number[k]);
+    for (int k = 0; k < 5; k++) pw_cells_number (t, number[k]);
     for (int i = 0; i < states; i++)
-      if (!pw_system_state_hidden (s, i)) pw_text_number (&t, p->state[i]);
-    pw_complex_cells (&t, o->re, o->im, o->multipliers, multipliers);
-    status = pw_text_line (&t, f, cmd->line.table, error);
+      if (!pw_system_state_hidden (s, i)) pw_cells_number (t, p->state[i]);
+    pw_complex_cells (t, o->re, o->im, o->multipliers, multipliers);
+    pw_cells_end (t);
   }
-  return status;
 }
 
 /* Stores x, y, phi, omega of the bodies drawn at PERIODIC_SAMPLES + 1 times of one period, one row for each. */

@@ -276,29 +276,27 @@ static void sensitivity_json (const void *context, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
+static void sensitivity_csv (const void *context, pw_cells *t) {
   const sensitivity *cmd = context;
   char unit[SENSITIVITY_UNIT];
-  pw_text t = { 0 };
-  pw_text_cell (&t, "t [s]");
+  pw_cells_text (t, "t [s]");
   for (int o = 0; o < cmd->outputs.count; o++) {
     if (!pw_outcome_is_final (&cmd->outcomes, o)) continue;
-    pw_text_name (&t, cmd->outputs.of[o], pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
+    pw_cells_name (t, cmd->outputs.of[o], pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < cmd->unknowns.count; p++)
-      pw_text_name (&t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", cmd->outputs.of[o], cmd->unknowns.list[p].name),
-                    sensitivity_unit (cmd, o, p, unit));
+      pw_cells_name (t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", cmd->outputs.of[o], cmd->unknowns.list[p].name),
+                     sensitivity_unit (cmd, o, p, unit));
   }
-  int status = pw_text_line (&t, f, cmd->line.table, error);
-  for (int i = 0; i < cmd->outputs.rows && status == PW_OK; i++) {
-    pw_text_number (&t, cmd->outputs.t[i]);
+  pw_cells_end (t);
+  for (int i = 0; i < cmd->outputs.rows; i++) {
+    pw_cells_number (t, cmd->outputs.t[i]);
     for (int o = 0; o < cmd->outputs.count; o++) {
       if (!pw_outcome_is_final (&cmd->outcomes, o)) continue;
-      pw_text_number (&t, cmd->table[o * cmd->outputs.rows + i]);
-      for (int p = 0; p < cmd->unknowns.count; p++) pw_text_number (&t, sensitivity_of (cmd, o, p, i)->value);
+      pw_cells_number (t, cmd->table[o * cmd->outputs.rows + i]);
+      for (int p = 0; p < cmd->unknowns.count; p++) pw_cells_number (t, sensitivity_of (cmd, o, p, i)->value);
     }
-    status = pw_text_line (&t, f, cmd->line.table, error);
+    pw_cells_end (t);
   }
-  return status;
 }
 
 /* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be

@@ -441,29 +441,27 @@ static int steady_most_eigenvalues (const pw_steady_command *cmd) {
   return most;
 }
 
-static int steady_csv (const void *context, FILE *f, pw_error *error) {
+static void steady_csv (const void *context, pw_cells *t) {
   const pw_steady_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
   int states = 2 * pw_system_coordinates (s), most = steady_most_eigenvalues (cmd);
-  pw_text t = { .chars = NULL };
-  pw_text_cell (&t, "branch,event");
-  pw_text_name (&t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
-  pw_text_cell (&t, "growing,residual");
-  pw_states_header (s, &t);
-  pw_complex_header (&t, most, "1/s");
-  int status = pw_text_line (&t, f, cmd->line.table, error);
-  for (const pw_steady_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
-    pw_text_number (&t, p->branch);
-    pw_text_cell (&t, steady_events[p->motion.event]);
-    pw_text_number (&t, p->motion.parameter);
-    pw_text_number (&t, p->motion.unstable);
-    pw_text_number (&t, p->motion.residual);
+  pw_cells_text (t, "branch,event");
+  pw_cells_name (t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
+  pw_cells_text (t, "growing,residual");
+  pw_states_header (s, t);
+  pw_complex_header (t, most, "1/s");
+  pw_cells_end (t);
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    pw_cells_number (t, p->branch);
+    pw_cells_text (t, steady_events[p->motion.event]);
+    pw_cells_number (t, p->motion.parameter);
+    pw_cells_number (t, p->motion.unstable);
+    pw_cells_number (t, p->motion.residual);
     for (int i = 0; i < states; i++)
-      if (!pw_system_state_hidden (s, i)) pw_text_number (&t, p->state[i]);
-    pw_complex_cells (&t, p->linear.re, p->linear.im, p->linear.unknowns, most);
-    status = pw_text_line (&t, f, cmd->line.table, error);
+      if (!pw_system_state_hidden (s, i)) pw_cells_number (t, p->state[i]);
+    pw_complex_cells (t, p->linear.re, p->linear.im, p->linear.unknowns, most);
+    pw_cells_end (t);
   }
-  return status;
 }
 
 enum { REAL, IMAGINARY }; /* parts of an eigenvalue */

@@ -320,20 +320,20 @@ void pw_states_json (const pw_system *s, const double *q, const double *v, const
   pw_json_close (j, '}');
 }
 
-void pw_states_header (const pw_system *s, pw_text *t) {
+void pw_states_header (const pw_system *s, pw_cells *t) {
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
     if (!pw_system_state_hidden (s, i))
-      pw_text_name (t, PW_NAME (pw_system_state_name, s, i), pw_system_state_unit (s, i));
+      pw_cells_name (t, PW_NAME (pw_system_state_name, s, i), pw_system_state_unit (s, i));
 }
 
-void pw_complex_header (pw_text *t, int most, const char *unit) {
+void pw_complex_header (pw_cells *t, int most, const char *unit) {
   char name[32];
   for (int i = 0; i < 2 * most; i++)
-    snprintf (name, sizeof name, "%s%d", i % 2 ? "im" : "re", i / 2 + 1), pw_text_name (t, name, unit);
+    snprintf (name, sizeof name, "%s%d", i % 2 ? "im" : "re", i / 2 + 1), pw_cells_name (t, name, unit);
 }
 
-void pw_complex_cells (pw_text *t, const double *re, const double *im, int count, int most) {
-  for (int i = 0; i < 2 * most; i++) pw_text_number (t, i / 2 < count ? (i % 2 ? im : re)[i / 2] : NAN);
+void pw_complex_cells (pw_cells *t, const double *re, const double *im, int count, int most) {
+  for (int i = 0; i < 2 * most; i++) pw_cells_number (t, i / 2 < count ? (i % 2 ? im : re)[i / 2] : NAN);
 }
 
 const char *pw_states_symmetries (int count, char text[40]) {

@@ -146,9 +146,9 @@ void pw_states_json (const pw_system *s, const double *q, const double *v, const
 
 /* Add cells of a table: the names of the states; of `most` complex numbers, re1, im1, re2, ...; and these numbers, nan
  * beyond `count`. */
-void pw_states_header (const pw_system *s, pw_text *t);
-void pw_complex_header (pw_text *t, int most, const char *unit);
-void pw_complex_cells (pw_text *t, const double *re, const double *im, int count, int most);
+void pw_states_header (const pw_system *s, pw_cells *t);
+void pw_complex_header (pw_cells *t, int most, const char *unit);
+void pw_complex_cells (pw_cells *t, const double *re, const double *im, int count, int most);
 
 /* " up to 3 symmetries", or "" if there are none; returns the text. */
 const char *pw_states_symmetries (int count, char text[40]);

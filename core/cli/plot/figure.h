@@ -47,7 +47,7 @@ typedef struct {
   int takes_folder; /* 1: -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood */
   int lines;        /* pw_json.lines of the summary */
   /* NULL: the command writes the table itself, to a file that is not opened here */
-  int (*table) (const void *context, FILE *f, pw_error *error);
+  void (*table) (const void *context, pw_cells *c);
   void (*json) (const void *context, pw_json *j);
   int (*draw) (const void *context, pw_error *error); /* with --plots */
 } pw_results;

@@ -325,21 +325,20 @@ static void reference_print (const pw_reference *reference, int partners) {
 static int reference_write (const pw_reference *reference, const char *folder, pw_error *error) {
   pw_output *output = pw_figure_open_file (folder, "truth.csv", error);
   if (output == NULL) return error->status;
-  FILE *f = pw_output_stream (output);
-  pw_text line = { .chars = NULL };
-  pw_text_cell (&line, "truth,against");
+  pw_cells line = { .f = pw_output_stream (output) };
+  pw_cells_text (&line, "truth,against");
   for (const pw_study_column *c = compare_columns + COLUMN_ERROR; c < compare_columns + COLUMN_ERROR + MOTION_ERRORS;
        c++)
-    pw_text_name (&line, c->name, c->unit);
-  int status = pw_text_line (&line, f, folder, error);
-  for (int i = -1; status == PW_OK && reference->known && i < reference->partners; i++) {
-    pw_text_quoted (&line, reference->name);
-    pw_text_quoted (&line, i < 0 ? "uncertainty" : reference->partner[i].name);
+    pw_cells_name (&line, c->name, c->unit);
+  pw_cells_end (&line);
+  for (int i = -1; reference->known && i < reference->partners; i++) {
+    pw_cells_quoted (&line, reference->name);
+    pw_cells_quoted (&line, i < 0 ? "uncertainty" : reference->partner[i].name);
     for (int k = 0; k < MOTION_ERRORS; k++)
-      pw_text_number (&line, i < 0 ? reference->uncertainty[k] : reference->partner[i].error[k]);
-    status = pw_text_line (&line, f, folder, error);
+      pw_cells_number (&line, i < 0 ? reference->uncertainty[k] : reference->partner[i].error[k]);
+    pw_cells_end (&line);
   }
-  return pw_cli_close_table (output, status, error);
+  return pw_output_finish (output, error);
 }
 
 /* ---- The conclusion: the processor time of each method for the numbers of correct digits in conclusion_required,

@@ -221,17 +221,17 @@ static int drift_begin (pw_study *study, pw_error *error) {
 static int drift_write_times (const pw_study *study, pw_error *error) {
   pw_output *output = pw_figure_open_file (study->folder, "drift-time.csv", error);
   if (output == NULL) return error->status;
-  pw_text line = { .chars = NULL };
-  pw_text_cell (&line, "method,t [s],position,velocity,balance [J]");
-  int status = pw_text_line (&line, pw_output_stream (output), study->folder, error);
+  pw_cells line = { .f = pw_output_stream (output) };
+  pw_cells_text (&line, "method,t [s],position,velocity,balance [J]");
+  pw_cells_end (&line);
   for (const pw_row *row = study->row; row < study->row + study->rows; row++)
-    for (int k = 0; status == PW_OK && row->group == DRIFT_METHODS && k < row->points; k++) {
+    for (int k = 0; row->group == DRIFT_METHODS && k < row->points; k++) {
       if (isnan (row->point[k][1])) continue;
-      pw_text_cell (&line, row->method);
-      for (int i = 0; i <= DRIFT_QUANTITIES; i++) pw_text_number (&line, row->point[k][i]);
-      status = pw_text_line (&line, pw_output_stream (output), study->folder, error);
+      pw_cells_text (&line, row->method);
+      for (int i = 0; i <= DRIFT_QUANTITIES; i++) pw_cells_number (&line, row->point[k][i]);
+      pw_cells_end (&line);
     }
-  return pw_cli_close_table (output, status, error);
+  return pw_output_finish (output, error);
 }
 
 /* A panel for each quantity, against time, alpha > 0, or the interval between projections. */

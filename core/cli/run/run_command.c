@@ -21,7 +21,7 @@ typedef struct {
   double next_time;      /* of the next checkpoint [s]; INFINITY: never */
   const char *last_path; /* of the last one, resumed or saved; NULL: none */
   double last_time;      /* its time [s] */
-  pw_text fingerprint;   /* of this run: the head of its checkpoints */
+  pw_stream fingerprint; /* of this run: the head of its checkpoints */
   pw_archive state;      /* of the next checkpoint */
   pw_checkpoint resumed; /* the checkpoint from which the run continues */
   pw_output *lock;       /* FILE.part, empty, which locks out other processes during the whole run */
@@ -549,33 +549,39 @@ static int checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_
   return PW_OK;
 }
 
-/* Everything that determines the results. */
-static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
+/* Writes everything that determines the results. */
+static int checkpoints_write_fingerprint (const pw_run_cli *command, FILE *f, pw_error *error) {
   const unsigned short order = 1;
-  pw_text *text = &command->checkpoints.fingerprint;
   const pw_model *model = command->line.m.model;
-  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, &command->line, pw_fingerprint_tables (0, model), command->method,
+  if (pw_fingerprint_run (f, PW_CHECKPOINT_MAGIC, &command->line, pw_fingerprint_tables (0, model), command->method,
                           &command->settings, error) != PW_OK)
     return error->status;
-  if (command->engine.code) pw_fingerprint_line (text, checkpoints_engine_key, NULL, "specialised");
+  if (command->engine.code) pw_fingerprint_line (f, checkpoints_engine_key, NULL, "specialised");
   for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++)
-    pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
-  pw_fingerprint_initial (text, command->line.starts);
-  pw_fingerprint_line (text, "table", NULL, command->table_path ? "written" : "not written");
-  pw_fingerprint_number (text, "every", NULL, command->row_interval);
-  pw_fingerprint_line (text, "energy", NULL, command->with_energies ? "kept" : "not kept");
-  pw_fingerprint_line (text, "plots", NULL, command->plots_path ? "drawn" : "not drawn");
-  pw_fingerprint_line (text, "animation", NULL, command->page_path ? "written" : "not written");
+    pw_fingerprint_number (f, "parameter", parameter->name, pw_model_parameter (model, parameter));
+  pw_fingerprint_initial (f, command->line.starts);
+  pw_fingerprint_line (f, "table", NULL, command->table_path ? "written" : "not written");
+  pw_fingerprint_number (f, "every", NULL, command->row_interval);
+  pw_fingerprint_line (f, "energy", NULL, command->with_energies ? "kept" : "not kept");
+  pw_fingerprint_line (f, "plots", NULL, command->plots_path ? "drawn" : "not drawn");
+  pw_fingerprint_line (f, "animation", NULL, command->page_path ? "written" : "not written");
   if (command->reference_path == NULL)
-    pw_fingerprint_line (text, "reference", NULL, "the model's");
-  else if (pw_fingerprint_file (text, "reference", command->reference_path, command->reference_path, error) != PW_OK)
+    pw_fingerprint_line (f, "reference", NULL, "the model's");
+  else if (pw_fingerprint_file (f, "reference", command->reference_path, command->reference_path, error) != PW_OK)
     return error->status;
-  pw_fingerprint_number (text, checkpoints_interval_key, NULL, command->checkpoints.interval);
+  pw_fingerprint_number (f, checkpoints_interval_key, NULL, command->checkpoints.interval);
   const char *numbers =
       PW_PRINTED (60, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big", sizeof (long));
-  pw_fingerprint_line (text, "numbers", NULL, numbers);
-  pw_text_add (text, "end\n");
-  return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
+  pw_fingerprint_line (f, "numbers", NULL, numbers);
+  fputs ("end\n", f);
+  return PW_OK;
+}
+
+static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
+  pw_stream *text = &command->checkpoints.fingerprint;
+  FILE *f = pw_stream_open (text);
+  const int status = f ? checkpoints_write_fingerprint (command, f, error) : PW_OK;
+  return pw_stream_close (f, text) == PW_OK ? status : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
@@ -592,9 +598,9 @@ static int checkpoints_prepare (pw_run_cli *command, pw_error *error) {
     return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
                     checkpoints->path);
   if (checkpoints_fingerprint (command, error) != PW_OK) return error->status;
-  const pw_text *own = &checkpoints->fingerprint;
+  const pw_stream *own = &checkpoints->fingerprint;
   const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
-  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
+  const pw_fingerprint here = { own->text, own->text + own->size, "here" };
   char difference[300];
   if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
@@ -667,7 +673,7 @@ static int checkpoints_save (pw_run_cli *command, pw_error *error) {
   if (checkpoints->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");
   pw_output *output = pw_output_open_as (checkpoints->path, ".next", error);
   status =
-      output ? pw_checkpoint_put (output, checkpoints->fingerprint.chars, &checkpoints->state, error) : error->status;
+      output ? pw_checkpoint_put (output, checkpoints->fingerprint.text, &checkpoints->state, error) : error->status;
   if (status == PW_OK) checkpoints->last_path = checkpoints->path, checkpoints->last_time = t;
   return status;
 }
@@ -1023,7 +1029,7 @@ static int run_command (void *options, pw_error *error) {
   int status = run_finish (command, error);
   pw_checkpoints *checkpoints = &command->checkpoints;
   if (checkpoints->lock) pw_output_discard (checkpoints->lock);
-  pw_text_free (&checkpoints->fingerprint);
+  free (checkpoints->fingerprint.text);
   pw_archive_free (&checkpoints->state);
   pw_checkpoint_free (&checkpoints->resumed);
   pw_plots_close (command->plots);

@@ -1,4 +1,5 @@
 /* The common part of compare and drift: reads --methods, performs the runs, writes tables and figures. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -214,10 +215,17 @@ static void table_print (const pw_study *study, const pw_row *row) {
   fflush (stdout);
 }
 
+/* Ends a line of the CSV file, which has all lines so far if the study is stopped. */
+static int table_end_line (const pw_study *study, pw_cells *line, pw_error *error) {
+  pw_cells_end (line);
+  if (fflush (line->f) == 0) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", study->table_path ? study->table_path : study->folder,
+                  strerror (errno));
+}
+
 /* Prints a row unless the study is quiet, and writes it into the CSV file. */
 static int table_write_row (pw_study *study, const pw_row *row, pw_error *error) {
   const pw_study_column *column = study->type->column;
-  pw_text line = { .chars = NULL };
   if (!study->quiet && study->headed != row->group + 1) {
     const int width = table_width (study);
     printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[row->group],
@@ -229,14 +237,14 @@ static int table_write_row (pw_study *study, const pw_row *row, pw_error *error)
   }
   if (!study->quiet) table_print (study, row);
   if (study->csv == NULL) return PW_OK;
+  pw_cells line = { .f = pw_output_stream (study->csv) };
   for (int i = 0; i < study->type->columns; i++)
     if (column[i].text)
-      pw_text_cell (&line, column[i].text (row));
+      pw_cells_text (&line, column[i].text (row));
     else if (column[i].name)
-      pw_text_number (&line, row->value[i]);
-  pw_text_quoted (&line, row->reason);
-  return pw_text_line (&line, pw_output_stream (study->csv), study->table_path ? study->table_path : study->folder,
-                       error);
+      pw_cells_number (&line, row->value[i]);
+  pw_cells_quoted (&line, row->reason);
+  return table_end_line (study, &line, error);
 }
 
 /* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.  A point
@@ -292,12 +300,11 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   study->line.files.output[2] = NULL;
   if (study->csv == NULL) return error->status;
   /* Rows follow as they finish, in NAME.part, which remains if the study is stopped. */
-  pw_text heading = { .chars = NULL };
+  pw_cells heading = { .f = pw_output_stream (study->csv) };
   for (const pw_study_column *c = study->type->column; c < study->type->column + study->type->columns; c++)
-    if (c->name) pw_text_name (&heading, c->name, c->unit);
-  pw_text_cell (&heading, "reason");
-  return pw_text_line (&heading, pw_output_stream (study->csv), study->table_path ? study->table_path : study->folder,
-                       error);
+    if (c->name) pw_cells_name (&heading, c->name, c->unit);
+  pw_cells_text (&heading, "reason");
+  return table_end_line (study, &heading, error);
 }
 
 static int study_open (pw_study *study, pw_error *error) {

@@ -64,8 +64,8 @@ typedef struct {
   pw_names column_of;       /* from a state's name to the index of its column */
   pw_arena arena;           /* of the grid and of names */
   uint64_t tables_sum;      /* a checksum of the points of all tables of models built so far; 0: there are none */
-  pw_text heading;          /* the table's first line, without its end */
-  pw_text fingerprint;      /* the first lines of a journal or part: everything that determines the rows */
+  pw_stream heading;        /* the table's first line, without its end */
+  pw_stream fingerprint;    /* the first lines of a journal or part: everything that determines the rows */
 } pw_plan;
 
 /* A compiled system, shared by rows with the same parameters. */
@@ -292,14 +292,14 @@ static int plan_find_columns (pw_plan *plan, pw_error *error) {
 }
 
 /* A cell of a row or, if that is NULL, of the heading, which alone uses name and unit. */
-static void plan_cell (const sweep_row *row, pw_text *text, const char *name, const char *unit, double value) {
-  row ? pw_text_number (text, value) : pw_text_name (text, name, unit);
+static void plan_cell (const sweep_row *row, pw_cells *text, const char *name, const char *unit, double value) {
+  row ? pw_cells_number (text, value) : pw_cells_name (text, name, unit);
 }
 
 /* Appends the cells of a row, nan where there is no run or no sample; if the row is NULL, the heading.  No end of the
  * line is added.  last: its last sample; has_outputs 1: its outputs are known. */
 static void plan_cells (const pw_plan *plan, const sweep_row *row, const pw_sample *last, int has_outputs,
-                        pw_text *text) {
+                        pw_cells *text) {
   const pw_run *run = row ? row->run : NULL;
   const pw_statistics *statistics = run ? pw_run_statistics (run) : NULL;
   const int *state = row && row->system ? row->system->state : NULL;
@@ -308,7 +308,7 @@ static void plan_cells (const pw_plan *plan, const sweep_row *row, const pw_samp
     const char *name = row ? NULL : PW_PRINTED (300, "%s%s", axis->parameter ? "" : "start.", axis->name);
     plan_cell (row, text, name, axis->unit, row ? grid_value (&plan->grid, i, row->number) : 0);
   }
-  pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");
+  pw_cells_text (text, row ? pw_cli_status_word (row->status) : "status");
   plan_cell (row, text, "t", "s", last ? last->t : run ? pw_run_time (run) : NAN);
   for (int i = 0; i < plan->columns; i++) {
     const int n = last ? pw_system_coordinates (row->system->model.system) : 0, k = last ? state[i] : -1;
@@ -331,11 +331,10 @@ static void plan_cells (const pw_plan *plan, const sweep_row *row, const pw_samp
   plan_cell (row, text, "rhs", NULL, run ? (double)statistics->rhs : NAN);
   if (plan->with_cpu)
     plan_cell (row, text, "cpu", "s", run ? pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start : 0);
-  row ? pw_text_quoted (text, row->error.text) : pw_text_cell (text, "reason");
+  row ? pw_cells_quoted (text, row->error.text) : pw_cells_text (text, "reason");
 }
 
-static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
-  pw_text *text = &plan->fingerprint;
+static int plan_write_fingerprint (const pw_plan *plan, const pw_model *model, FILE *text, pw_error *error) {
   if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line, plan->tables_sum, plan->method, &plan->settings, error) !=
       PW_OK)
     return error->status;
@@ -351,20 +350,27 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
     if (!is_varied) pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
   }
   pw_fingerprint_initial (text, plan->line->starts);
-  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
-  for (int i = 0; i < plan->grid.axes; i++) {
-    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].text);
-    pw_text_cell (&order, plan->grid.axis[i].name);
-  }
-  text->failed |= order.failed;
-  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
-  pw_text_free (&order);
+  const pw_axis *axis = plan->grid.axis;
+  for (int i = 0; i < plan->grid.axes; i++) pw_fingerprint_line (text, "vary", axis[i].name, axis[i].text);
+  fputs ("order = ", text); /* of the axes, which determines the order of the rows */
+  for (int i = 0; i < plan->grid.axes; i++) fprintf (text, "%s%s", i ? "," : "", axis[i].name);
+  fputc ('\n', text);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
-  pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
+  pw_fingerprint_line (text, "columns", NULL, plan->heading.text);
   pw_fingerprint_line (text, "part", NULL, PW_PRINTED (60, "%d/%d", plan->part, plan->parts));
-  pw_text_add (text, "end\n");
-  if (text->failed || plan->heading.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  fputs ("end\n", text);
   return PW_OK;
+}
+
+/* The heading and the fingerprint. */
+static int plan_texts (pw_plan *plan, const pw_model *model, pw_error *error) {
+  FILE *heading = pw_stream_open (&plan->heading);
+  if (heading) plan_cells (plan, NULL, NULL, 0, &(pw_cells){ .f = heading });
+  int status = pw_stream_close (heading, &plan->heading);
+  if (status != PW_OK) return pw_fail (error, status, "out of memory");
+  FILE *f = pw_stream_open (&plan->fingerprint);
+  if (f) status = plan_write_fingerprint (plan, model, f, error);
+  return pw_stream_close (f, &plan->fingerprint) == PW_OK ? status : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->line, and finds the columns by compiling
@@ -380,8 +386,7 @@ static int plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
     status = plan_match_axis (plan, plan->grid.axis + i, model, error);
   if (status == PW_OK) status = plan_find_columns (plan, error);
-  if (status == PW_OK) plan_cells (plan, NULL, NULL, 0, &plan->heading);
-  if (status == PW_OK) status = plan_fingerprint (plan, model, error);
+  if (status == PW_OK) status = plan_texts (plan, model, error);
   pw_model_free (model);
   return status;
 }
@@ -392,8 +397,8 @@ static void plan_close (pw_plan *plan) {
   pw_scene_code_close (plan->lanes_code);
   pw_names_close (&plan->column_of);
   pw_arena_free (&plan->arena);
-  pw_text_free (&plan->heading);
-  pw_text_free (&plan->fingerprint);
+  free (plan->heading.text);
+  free (plan->fingerprint.text);
   free (plan->column);
 }
 
@@ -423,7 +428,6 @@ typedef struct {
   off_t *offset;    /* in the journal, of the line of row r of the part: offset[r / parts]; 0: missing */
   long rows, done;  /* numbers of these rows; of those in the journal */
   off_t size;       /* bytes of the journal's complete lines */
-  pw_text line;     /* the line that is written */
 } pw_journal;
 
 /* How the runs of a table ended. */
@@ -507,7 +511,7 @@ static int journal_write (pw_journal *journal, const char *text, size_t size, pw
 static int journal_read (pw_journal *journal, const pw_plan *plan, const journal_map *map, pw_error *error) {
   char difference[400];
   size_t size = (size_t)(map->end - map->begin), magic_size = strlen (PW_SWEEP_MAGIC);
-  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.chars;
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.text;
   journal->size = 0;
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->begin, PW_SWEEP_MAGIC, size < magic_size ? size : magic_size) == 0) return PW_OK;
@@ -515,7 +519,7 @@ static int journal_read (pw_journal *journal, const pw_plan *plan, const journal
                     journal->path);
   }
   const pw_fingerprint there = { map->begin, rows, "there" };
-  const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.length, "here" };
+  const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.size, "here" };
   if (pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
@@ -542,7 +546,7 @@ static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *er
   if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->path, strerror (errno));
   journal->begun = journal->size == 0;
-  return journal->begun ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
+  return journal->begun ? journal_write (journal, plan->fingerprint.text, plan->fingerprint.size, error) : PW_OK;
 }
 
 /* Opens the journal of the table at `path`, or creates it.  It is truncated at the first line that is incomplete,
@@ -566,13 +570,13 @@ static int journal_open (pw_journal *journal, const pw_plan *plan, const char *p
 static int journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text,
                         pw_error *error) {
   const off_t at = journal->size;
-  const unsigned long checksum = journal_checksum (row, status, text, strlen (text));
-  pw_text_clear (&journal->line);
-  pw_text_add (&journal->line, PW_PRINTED (60, "%ld %d %08lx ", row, status, checksum));
-  pw_text_add (&journal->line, text);
-  pw_text_add (&journal->line, "\n");
-  if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (journal_write (journal, journal->line.chars, journal->line.length, error) != PW_OK) return error->status;
+  char *line;
+  const int size =
+      asprintf (&line, "%ld %d %08lx %s\n", row, status, journal_checksum (row, status, text, strlen (text)), text);
+  if (size < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
+  status = journal_write (journal, line, (size_t)size, error);
+  free (line);
+  if (status != PW_OK) return status;
   journal->offset[row / plan->parts] = at;
   journal->done++;
   return PW_OK;
@@ -582,7 +586,6 @@ static int journal_add (pw_journal *journal, const pw_plan *plan, long row, int 
 static void journal_close (pw_journal *journal) {
   if (journal->begun && journal->done == 0 && journal->descriptor >= 0) unlink (journal->path);
   if (journal->descriptor >= 0) close (journal->descriptor);
-  pw_text_free (&journal->line);
   free (journal->offset);
   free (journal->path);
   free (journal->table_path);
@@ -595,10 +598,15 @@ static int table_read_row (const char *at, const char *end, long row, journal_li
   tally->rows++;
   if (line->status == 0 || tally->failed++ > 0) return 1;
   tally->status = line->status;
-  pw_text reason = { .chars = NULL }; /* the last cell */
-  for (const char *c = line->text; pw_text_read_cell (&c, &reason) == ',';) continue;
-  snprintf (tally->reason, sizeof tally->reason, "%s", reason.chars ? reason.chars : "");
-  pw_text_free (&reason);
+  /* the reason is the last cell and the only one in quotes, which are doubled inside */
+  const char *c = line->text, *last = line->text + line->text_size - 2;
+  while (c < last && !(c[0] == ',' && c[1] == '"')) c++;
+  size_t n = 0;
+  for (c += 2; c < last && n + 1 < sizeof tally->reason; c++) {
+    tally->reason[n++] = *c;
+    if (*c == '"') c++;
+  }
+  tally->reason[n] = 0;
   return 1;
 }
 
@@ -631,7 +639,7 @@ static void table_keep (const pw_plan *plan, long row, const char *line) {
   for (int i = 0; i < count; i++) {
     const char *cell = line;
     double *value = &plan->drawn[row * count + i];
-    for (int k = table_cell_of (plan, i); k > 0; k--) pw_text_read_cell (&cell, NULL);
+    for (int k = table_cell_of (plan, i); k > 0; k--) cell += strcspn (cell, ",") + 1;
     if (pw_read_number (PW_PART (cell, strcspn (cell, ",")), value) != PW_OK) *value = NAN;
   }
 }
@@ -642,22 +650,25 @@ typedef struct {
   const pw_plan *plan;
   const journal_map *map;
   pw_tally *tally;
+  pw_error *error; /* if the journal was changed */
 } table_source;
 
-static int table_write (const void *context, FILE *f, pw_error *error) {
+static void table_write (const void *context, pw_cells *cells) {
   const table_source *x = context;
+  FILE *f = cells->f;
   const pw_plan *plan = x->plan;
   const int is_part = plan->parts > 1;
-  fprintf (f, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.chars : plan->heading.chars);
+  fprintf (f, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.text : plan->heading.text);
   for (long k = 0; k < x->journal->rows; k++) {
     const char *at = x->map->begin + x->journal->offset[k];
     journal_line line;
-    if (!table_read_row (at, x->map->end, plan->part - 1 + k * plan->parts, &line, x->tally))
-      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", x->journal->path);
+    if (!table_read_row (at, x->map->end, plan->part - 1 + k * plan->parts, &line, x->tally)) {
+      pw_fail (x->error, PW_RESOURCE, "%s was changed by another program", x->journal->path);
+      return;
+    }
     fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, f);
     if (plan->drawn) table_keep (plan, k, line.text);
   }
-  return PW_OK;
 }
 
 /* Writes the table of a complete journal, or its part, and removes the journal. */
@@ -668,7 +679,7 @@ static int table_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tal
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
-  const table_source source = { journal, plan, &map, tally };
+  const table_source source = { journal, plan, &map, tally, &failure };
   if (output) pw_cli_write_table (journal->table_path, pw_output_stream (output), &source, table_write, &failure);
   if (output) table_close (output, &failure);
   journal_map_close (&map);
@@ -964,7 +975,7 @@ static int row_ended (const sweep_row *row, const pw_plan *plan) {
 
 /* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
  * status.  No cells are written if this is PW_RETRY, after a request to stop, or PW_RESOURCE. */
-static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
+static int row_close (sweep_row *row, const pw_plan *plan, pw_stream *text) {
   pw_sample sample, *last = NULL;
   pw_error sample_error = { 0 };
   if (row->status == PW_STOPPED) row->status = pw_limit_status (&row->limit, pw_run_time (row->run), &row->error);
@@ -976,11 +987,13 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
   /* PW_RETRY, from a method, without a request to stop */
   if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
-  if (row->status != PW_RETRY && row->status != PW_RESOURCE) plan_cells (plan, row, last, has_outputs, text);
+  FILE *f = pw_stream_open (text);
+  if (f && row->status != PW_RETRY && row->status != PW_RESOURCE)
+    plan_cells (plan, row, last, has_outputs, &(pw_cells){ .f = f });
   pw_outcomes_close (&row->of);
   pw_run_close (row->run);
   free (row->state_error);
-  if (!text->failed) return row->status;
+  if (pw_stream_close (f, text) == PW_OK) return row->status;
   row->error = (pw_error){ 0 };
   return pw_fail (&row->error, PW_RESOURCE, "out of memory");
 }
@@ -988,11 +1001,11 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
 /* ---- Rows; the caller holds the lock ---- */
 
 /* Adds a row to the journal, or keeps the first error, which stops all threads. */
-static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, const pw_text *text) {
+static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, const char *text) {
   if (status == PW_RETRY || sweep->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
     pw_fail (sweep->error, PW_RESOURCE, "row %ld of the grid: %s", row->number + 1, row->error.text);
-  else if (journal_add (sweep->journal, sweep->plan, row->number, -status, text->chars, sweep->error) == PW_OK)
+  else if (journal_add (sweep->journal, sweep->plan, row->number, -status, text, sweep->error) == PW_OK)
     pw_progress_at (&sweep->progress, (double)sweep->journal->done);
   if (sweep->error->status != PW_OK) pw_stop = 1;
 }
@@ -1005,7 +1018,6 @@ typedef struct {
   void *lanes_memory;
   int width; /* number of rows: at most that of lanes; 1 without lanes_code */
   sweep_row row[PW_LANES_MOST];
-  pw_text text; /* cells of a row */
 } sweep_worker;
 
 /* Opens the run of the next row; 0 if there is none.  The caller holds the lock, which is released meanwhile. */
@@ -1082,16 +1094,16 @@ static int worker_thread (void *context, int i, pw_error *error) {
     for (sweep_row *row = worker.row; row < worker.row + worker.width; row++) { /* stores those that have ended */
       if (row->system == NULL || !row_ended (row, sweep->plan)) continue;
       pthread_mutex_unlock (&sweep->lock);
-      pw_text_clear (&worker.text);
-      int status = row_close (row, sweep->plan, &worker.text);
+      pw_stream text;
+      int status = row_close (row, sweep->plan, &text);
       pthread_mutex_lock (&sweep->lock);
-      rows_store (sweep, row, status, &worker.text);
+      rows_store (sweep, row, status, text.text);
+      free (text.text);
       system_release (row->system);
       row->system = NULL;
     }
   } while (rows > 0);
   pthread_mutex_unlock (&sweep->lock);
-  pw_text_free (&worker.text);
   free (worker.lanes_memory);
   return PW_OK;
 }
