@@ -931,13 +931,10 @@ static void fit_table (const void *context, pw_cells *t) {
 }
 
 /* Data and model of each column along the run, below them the residuals. */
-static int fit_draw (const void *context, pw_error *error) {
+static void fit_draw (const void *context, pw_curves *c) {
   const pw_fit *fit = context;
   const int along = data_along (fit), several = along > 1;
   const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
-  pw_curves c;
-  int status = pw_curves_open (&c, &fit->line, fit->line.plots, "fit", "data and fitted model", error);
-  if (status != PW_OK) return status;
   for (int i = 0, panels = 0; i < fit->columns && panels < REPORT_PANELS; i++) {
     if (fit->column_kind[i] != FIT_ALONG) continue;
     panels++;
@@ -948,24 +945,23 @@ static int fit_draw (const void *context, pw_error *error) {
                        .x = { t[0], t[fit->timed - 1] },
                        .aspect = several ? 0.6 : 0.45,
                        .type = several ? PW_PANEL_HALF : 0 };
-    pw_curves_panel (&c, &panel);
-    pw_curves_add (&c, style, label);
-    for (int k = 0; k < fit->timed; k++) pw_curves_point (&c, t[k], data[k], sigma[k]);
-    pw_curves_add (&c, "model", "model");
-    for (int k = 0; k < fit->timed; k++) pw_curves_point (&c, t[k], fitted[k], 0);
+    pw_curves_panel (c, &panel);
+    pw_curves_add (c, style, label);
+    for (int k = 0; k < fit->timed; k++) pw_curves_point (c, t[k], data[k], sigma[k]);
+    pw_curves_add (c, "model", "model");
+    for (int k = 0; k < fit->timed; k++) pw_curves_point (c, t[k], fitted[k], 0);
     panel.y_label = "residual", panel.type |= PW_PANEL_BELOW, panel.aspect *= 0.6;
-    pw_curves_panel (&c, &panel);
-    pw_curves_add (&c, style, label);
-    for (int k = 0; k < fit->timed; k++) pw_curves_point (&c, t[k], fitted[k] - data[k], sigma[k]);
+    pw_curves_panel (c, &panel);
+    pw_curves_add (c, style, label);
+    for (int k = 0; k < fit->timed; k++) pw_curves_point (c, t[k], fitted[k] - data[k], sigma[k]);
   }
-  return pw_curves_draw (&c, PW_OK, error);
 }
 
 /* ---- The command ---- */
 
 #define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 
-static const pw_results fit_results = { "fit", 0, 2, fit_table, fit_json, fit_draw };
+static const pw_results fit_results = { "fit", "data and fitted model", 0, 2, fit_table, fit_json, fit_draw };
 
 static int fit_options (pw_fit *fit, pw_error *error) {
   const double starts = pw_cli_given_or (fit->starts_given, 1);

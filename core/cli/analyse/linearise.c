@@ -303,8 +303,7 @@ static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   pw_json_print (j, "]}");
 }
 
-static void linearise_csv (const void *context, pw_cells *t) {
-  const pw_linearise_command *cmd = context;
+static void linearise_csv (const pw_linearise_command *cmd, pw_cells *t) {
   const pw_system *s = cmd->line.m.system;
   int n = cmd->linear.unknowns, rows = n + cmd->outputs, columns = n + cmd->inputs;
   pw_cells_text (t, "row");

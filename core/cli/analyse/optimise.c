@@ -666,34 +666,31 @@ static void optimise_yaml (const void *context, pw_cells *result) {
 }
 
 /* The objective of every run against each unknown, the best one marked. */
-static int optimise_draw (const void *context, pw_error *error) {
+static void optimise_draw (const void *context, pw_curves *c) {
   const pw_optimise *problem = context;
   static const char *const style[] = { "infeasible", "feasible" };
   const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
   const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
-  pw_curves c;
-  int status = pw_curves_open (&c, &problem->line, problem->line.plots, "optimise", "runs of the optimisation", error);
-  if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     pw_curves_panel (
-        &c, &(pw_panel){ .x_label = PW_FIGURE_LABEL (problem->unknowns.list[i].name, problem->unknowns.list[i].unit),
-                         .y_label = objective,
-                         .aspect = panels > 1 ? 0.7 : 0.5,
-                         .type = panels > 1 ? PW_PANEL_HALF : 0 });
+        c, &(pw_panel){ .x_label = PW_FIGURE_LABEL (problem->unknowns.list[i].name, problem->unknowns.list[i].unit),
+                        .y_label = objective,
+                        .aspect = panels > 1 ? 0.7 : 0.5,
+                        .type = panels > 1 ? PW_PANEL_HALF : 0 });
     for (int feasible = 0; feasible < 2; feasible++) {
-      pw_curves_add (&c, style[feasible], style[feasible]);
+      pw_curves_add (c, style[feasible], style[feasible]);
       for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++)
         for (const double *run = s->trials; run && run < s->trials + s->runs * width; run += width)
-          if (!isnan (run[n]) && search_feasible (problem, run + n) == feasible)
-            pw_curves_point (&c, run[i], run[n], 0);
+          if (!isnan (run[n]) && search_feasible (problem, run + n) == feasible) pw_curves_point (c, run[i], run[n], 0);
     }
-    pw_curves_add (&c, "best", "best");
-    pw_curves_point (&c, problem->best->to[i], problem->best->output[0], 0);
+    pw_curves_add (c, "best", "best");
+    pw_curves_point (c, problem->best->to[i], problem->best->output[0], 0);
   }
-  return pw_curves_draw (&c, PW_OK, error);
 }
 
-static const pw_results optimise_results = { "optimise", 0, 2, optimise_yaml, optimise_json, optimise_draw };
+static const pw_results optimise_results = {
+  "optimise", "runs of the optimisation", 0, 2, optimise_yaml, optimise_json, optimise_draw
+};
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;

@@ -336,7 +336,7 @@ static void periodic_json (const void *context, pw_json *j) {
 static void periodic_csv (const void *context, pw_cells *t) {
   const pw_periodic_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
-  int states = 2 * pw_system_coordinates (s), multipliers = cmd->point->orbit.multipliers; /* of every point */
+  const int multipliers = cmd->point->orbit.multipliers; /* of every point */
   pw_cells_name (t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
   pw_cells_text (t, "event,period [s],displacement [m],rotation [rad],growing,residual");
   pw_states_header (s, t);
@@ -349,8 +349,7 @@ static void periodic_csv (const void *context, pw_cells *t) {
     pw_cells_text (t, periodic_events[o->event]);
     const double number[] = { o->period, d.total, o->rotation, o->unstable, o->residual };
     for (int k = 0; k < 5; k++) pw_cells_number (t, number[k]);
-    for (int i = 0; i < states; i++)
-      if (!pw_system_state_hidden (s, i)) pw_cells_number (t, p->state[i]);
+    pw_states_cells (s, p->state, t);
     pw_complex_cells (t, o->re, o->im, o->multipliers, multipliers);
     pw_cells_end (t);
   }
@@ -381,10 +380,10 @@ static int periodic_sample (const pw_periodic_command *cmd, int bodies, double *
 }
 
 /* Paths of the bodies, and their angular velocities over their angles. */
-static int periodic_draw_motion (const pw_periodic_command *cmd, pw_curves *c, pw_error *error) {
+static void periodic_draw_motion (const pw_periodic_command *cmd, pw_curves *c) {
   const int all = pw_system_bodies (cmd->line.m.system), bodies = all < PERIODIC_BODIES ? all : PERIODIC_BODIES;
   double *row = malloc ((size_t)(4 * bodies * (PERIODIC_SAMPLES + 1) + 1) * sizeof *row);
-  int status = row ? periodic_sample (cmd, bodies, row, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = row ? periodic_sample (cmd, bodies, row, &c->error) : pw_fail (&c->error, PW_RESOURCE, "out of memory");
   for (int phase = 0; phase < 2 && status == PW_OK; phase++) {
     pw_curves_panel (
         c, phase ? &(pw_panel){ .x_label = "φ [rad]", .y_label = "ω [rad/s]", .aspect = 1, .type = PW_PANEL_HALF }
@@ -402,7 +401,6 @@ static int periodic_draw_motion (const pw_periodic_command *cmd, pw_curves *c, p
         pw_curves_point (c, row[4 * (b + bodies * end)], row[4 * (b + bodies * end) + 1], b + 1);
   }
   free (row);
-  return status;
 }
 
 /* The ordinate of curve k over the parameter: displacement [m], modulus of the largest multiplier, period [s]. */
@@ -465,29 +463,27 @@ static void periodic_draw_multipliers (const pw_periodic_command *cmd, pw_curves
   }
 }
 
-static int periodic_draw (const void *context, pw_error *error) {
+static void periodic_draw (const void *context, pw_curves *c) {
   const pw_periodic_command *cmd = context;
   const double range[] = { fmin (cmd->settings.first, cmd->settings.last),
                            fmax (cmd->settings.first, cmd->settings.last) };
-  const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
-  pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "periodic", title, error);
-  if (status != PW_OK) return status;
   if (cmd->vary_text)
-    periodic_draw_branch (cmd, &c, range);
+    periodic_draw_branch (cmd, c, range);
   else
-    status = periodic_draw_motion (cmd, &c, error);
-  periodic_draw_multipliers (cmd, &c, range);
-  return pw_curves_draw (&c, status, error);
+    periodic_draw_motion (cmd, c);
+  periodic_draw_multipliers (cmd, c, range);
 }
 
-static const pw_results periodic_results = { "periodic", 1, 1, periodic_csv, periodic_json, periodic_draw };
+static const pw_results periodic_results = { "periodic",    "periodic motions", 1, 1, periodic_csv,
+                                             periodic_json, periodic_draw };
 
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;
+  pw_results results = periodic_results;
+  if (cmd->vary_text == NULL) results.title = "periodic motion over one period, Floquet multipliers";
   int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK) status = pw_results_open (&cmd->line, &periodic_results, pw_cli_tables, (pw_use){ 0 }, error);
+  if (status == PW_OK) status = pw_results_open (&cmd->line, &results, pw_cli_tables, (pw_use){ 0 }, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m), pw_cli_report_tables (cmd->line.m.system, cmd->settings.period);
   if (status == PW_OK) {
     pw_periodic_orbit o;
@@ -504,7 +500,7 @@ static int periodic_command (void *options, pw_error *error) {
   }
   if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
   if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
-  if (status == PW_OK && cmd->points) status = pw_results_write (&cmd->line, &periodic_results, cmd, error);
+  if (status == PW_OK && cmd->points) status = pw_results_write (&cmd->line, &results, cmd, error);
   for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
   free (cmd->point);
   pw_periodic_close (cmd->search);

@@ -301,33 +301,29 @@ static void sensitivity_csv (const void *context, pw_cells *t) {
 
 /* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be
  * compared. */
-static int sensitivity_draw (const void *context, pw_error *error) {
+static void sensitivity_draw (const void *context, pw_curves *c) {
   const sensitivity *cmd = context;
   const pw_unknowns *u = &cmd->unknowns;
-  pw_curves c;
-  if (cmd->outputs.rows < 2) return PW_OK;
-  int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "sensitivity", "derivatives along the run", error);
-  if (status != PW_OK) return status;
+  if (cmd->outputs.rows < 2) return;
   for (int o = 0; o < cmd->outputs.count; o++) {
     char label[300], unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
-    pw_curves_panel (&c, &(pw_panel){ .x_label = "t [s]",
-                                      .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""),
-                                      .x[1] = u->settings.span });
+    pw_curves_panel (c, &(pw_panel){ .x_label = "t [s]",
+                                     .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""),
+                                     .x[1] = u->settings.span });
     for (int p = 0; p < u->count; p++) {
       const double value = u->list[p].value, factor = value != 0 ? value : 1;
       const char *name = pw_figure_name (u->list[p].name, buffer), *times = value != 0 ? name : "";
       value != 0 ? pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit) : sensitivity_unit (cmd, o, p, unit);
       snprintf (label, sizeof label, *unit ? "%s%s∂/∂%s [%s]" : "%s%s∂/∂%s", times, *times ? " × " : "", name, unit);
-      pw_curves_add (&c, "line", label);
+      pw_curves_add (c, "line", label);
       for (int i = 0; i < cmd->outputs.rows; i++)
-        pw_curves_point (&c, cmd->outputs.t[i], sensitivity_of (cmd, o, p, i)->value * factor, 0);
+        pw_curves_point (c, cmd->outputs.t[i], sensitivity_of (cmd, o, p, i)->value * factor, 0);
     }
   }
-  return pw_curves_draw (&c, PW_OK, error);
 }
 
 static const pw_results sensitivity_results = {
-  "sensitivity", 1, 5, sensitivity_csv, sensitivity_json, sensitivity_draw
+  "sensitivity", "derivatives along the run", 1, 5, sensitivity_csv, sensitivity_json, sensitivity_draw
 };
 
 /* Sets the values of unknown initial states to those of the consistent initial state. */

@@ -444,7 +444,7 @@ static int steady_most_eigenvalues (const pw_steady_command *cmd) {
 static void steady_csv (const void *context, pw_cells *t) {
   const pw_steady_command *cmd = context;
   const pw_system *s = cmd->line.m.system;
-  int states = 2 * pw_system_coordinates (s), most = steady_most_eigenvalues (cmd);
+  const int most = steady_most_eigenvalues (cmd);
   pw_cells_text (t, "branch,event");
   pw_cells_name (t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
   pw_cells_text (t, "growing,residual");
@@ -457,8 +457,7 @@ static void steady_csv (const void *context, pw_cells *t) {
     pw_cells_number (t, p->motion.parameter);
     pw_cells_number (t, p->motion.unstable);
     pw_cells_number (t, p->motion.residual);
-    for (int i = 0; i < states; i++)
-      if (!pw_system_state_hidden (s, i)) pw_cells_number (t, p->state[i]);
+    pw_states_cells (s, p->state, t);
     pw_complex_cells (t, p->linear.re, p->linear.im, p->linear.unknowns, most);
     pw_cells_end (t);
   }
@@ -501,25 +500,22 @@ static void steady_ranges (const pw_steady_command *cmd, double re[2], double im
 }
 
 /* Eigenvalues over the parameter, stable parts solid, unstable ones dashed; below them the root locus. */
-static int steady_draw (const void *context, pw_error *error) {
+static void steady_draw (const void *context, pw_curves *c) {
   const pw_steady_command *cmd = context;
-  if (cmd->vary_text == NULL) return PW_OK;
+  if (cmd->vary_text == NULL) return;
   const double first = fmin (cmd->settings.first, cmd->settings.last),
                last = fmax (cmd->settings.first, cmd->settings.last);
   const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
   double re[2], im[2];
-  pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, cmd->line.plots, "steady", "eigenvalues of steady motions", error);
-  if (status != PW_OK) return status;
   steady_ranges (cmd, re, im);
   for (int part = REAL; part <= IMAGINARY; part++) {
     pw_panel panel = { .x_label = parameter, .x = { first, last }, .type = part == REAL ? 0 : PW_PANEL_BELOW };
     panel.y_label = part == REAL ? "real part [1/s]" : "frequency [Hz]";
     panel.y[0] = part == REAL ? re[0] : 0, panel.y[1] = part == REAL ? re[1] : im[1] / (2 * PW_PI);
-    pw_curves_panel (&c, &panel);
+    pw_curves_panel (c, &panel);
     /* on the parts of branches where no modes grow (stable or neutral), then where some do */
     for (int stable = 1; stable >= 0; stable--) {
-      pw_curves_add (&c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
+      pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
       for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
         for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
           const pw_steady_point *p = cmd->point + i;
@@ -528,8 +524,8 @@ static int steady_draw (const void *context, pw_error *error) {
           const int here = i + 1 < cmd->points && p[1].branch == p->branch && (decides->motion.unstable == 0) == stable;
           const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
           const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
-          pw_curves_point (&c, p->motion.parameter, shown ? value : NAN, 0);
-          if (!here) pw_curves_point (&c, NAN, NAN, 0);
+          pw_curves_point (c, p->motion.parameter, shown ? value : NAN, 0);
+          if (!here) pw_curves_point (c, NAN, NAN, 0);
           inside = here;
         }
     }
@@ -538,25 +534,25 @@ static int steady_draw (const void *context, pw_error *error) {
       int events = 0;
       for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
         if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
-        if (events++ == 0) pw_curves_add (&c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
-        pw_curves_point (&c, p->motion.parameter, INFINITY, 0);
+        if (events++ == 0) pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
+        pw_curves_point (c, p->motion.parameter, INFINITY, 0);
       }
     }
   }
-  pw_curves_panel (&c, &(pw_panel){ .x_label = "real part [1/s]",
-                                    .y_label = "imaginary part [1/s]",
-                                    .z_label = parameter,
-                                    .x = { re[0], re[1] },
-                                    .y = { im[0], im[1] },
-                                    .z = { first, last } });
-  pw_curves_add (&c, "scale", NULL);
+  pw_curves_panel (c, &(pw_panel){ .x_label = "real part [1/s]",
+                                   .y_label = "imaginary part [1/s]",
+                                   .z_label = parameter,
+                                   .x = { re[0], re[1] },
+                                   .y = { im[0], im[1] },
+                                   .z = { first, last } });
+  pw_curves_add (c, "scale", NULL);
   for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
     for (int i = 0; i < p->linear.unknowns; i++)
-      if (!p->linear.rigid[i]) pw_curves_point (&c, p->linear.re[i], p->linear.im[i], p->motion.parameter);
-  return pw_curves_draw (&c, PW_OK, error);
+      if (!p->linear.rigid[i]) pw_curves_point (c, p->linear.re[i], p->linear.im[i], p->motion.parameter);
 }
 
-static const pw_results steady_results = { "steady", 1, 1, steady_csv, steady_json, steady_draw };
+static const pw_results steady_results = { "steady",   "eigenvalues of steady motions", 1, 1, steady_csv, steady_json,
+                                           steady_draw };
 
 /* Finds steady motions of the model; with --vary branches that begin at the ends of the range or, if there are none,
  * at the value of the model or within the range. */

@@ -326,6 +326,11 @@ void pw_states_header (const pw_system *s, pw_cells *t) {
       pw_cells_name (t, PW_NAME (pw_system_state_name, s, i), pw_system_state_unit (s, i));
 }
 
+void pw_states_cells (const pw_system *s, const double *state, pw_cells *t) {
+  for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
+    if (!pw_system_state_hidden (s, i)) pw_cells_number (t, state[i]);
+}
+
 void pw_complex_header (pw_cells *t, int most, const char *unit) {
   char name[32];
   for (int i = 0; i < 2 * most; i++)

@@ -144,9 +144,10 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
 /* Writes an object with the names and values of all states. */
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);
 
-/* Add cells of a table: the names of the states; of `most` complex numbers, re1, im1, re2, ...; and these numbers, nan
- * beyond `count`. */
+/* Add cells of a table: the names of the states; their values q, v; the names of `most` complex numbers, re1, im1,
+ * re2, ...; and these numbers, nan beyond `count`. */
 void pw_states_header (const pw_system *s, pw_cells *t);
+void pw_states_cells (const pw_system *s, const double *state, pw_cells *t);
 void pw_complex_header (pw_cells *t, int most, const char *unit);
 void pw_complex_cells (pw_cells *t, const double *re, const double *im, int count, int most);
 

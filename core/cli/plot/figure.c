@@ -77,19 +77,6 @@ int pw_results_open (pw_cli_line *line, const pw_results *r, const char *const *
   return status == PW_OK ? pw_files_open (line, use, count, error) : status;
 }
 
-int pw_results_write (pw_cli_line *line, const pw_results *r, const void *context, pw_error *error) {
-  FILE *table = pw_files_stream (line, RESULTS_TABLE), *summary = pw_files_stream (line, RESULTS_JSON);
-  pw_error drawing = { 0 };
-  if (line->plots) line->drawn = r->draw (context, &drawing);
-  int status = table ? pw_cli_write_table (line->table, table, context, r->table, error) : PW_OK;
-  if (status == PW_OK && summary) r->json (context, &(pw_json){ .f = summary, .lines = r->lines });
-  if (status == PW_OK) status = pw_files_finish (line, error);
-  if (status != PW_OK && drawing.status != PW_OK) pw_cli_say ("pinwheel: %s\n", drawing.text);
-  if (status != PW_OK) return status;
-  *error = drawing;
-  return line->drawn;
-}
-
 const char *pw_results_word (const pw_cli_line *line, int interrupted, int converged) {
   if (interrupted) return pw_cli_status_word (PW_INTERRUPTED);
   return pw_cli_status_word (line->drawn != PW_OK || converged ? line->drawn : PW_METHOD);
@@ -341,21 +328,39 @@ void pw_curves_cell (pw_curves *c, const double x[2], const double y[2], double 
   fprintf (pw_output_stream (c->data), " %.10g %.10g %.10g %.10g\n", x[0], x[1], y[0], y[1]);
 }
 
-int pw_curves_close (pw_curves *c, int status, pw_error *error) {
+int pw_curves_close (pw_curves *c, pw_error *error) {
   curves_end_panel (c);
-  if (status != PW_OK || c->panels == 0) {
+  if (c->error.status != PW_OK || c->panels == 0) {
     pw_output_discard (c->data);
     pw_output_discard (c->script);
-    return status;
+    *error = c->error;
+    return error->status;
   }
   fprintf (pw_output_stream (c->script), "panels = %d\n", c->panels);
-  status = pw_output_finish (c->data, error);
+  int status = pw_output_finish (c->data, error);
   if (status == PW_OK) return pw_figure_end (c->script, "panels", error);
   pw_output_discard (c->script);
   return status;
 }
 
-int pw_curves_draw (pw_curves *c, int status, pw_error *error) {
-  status = pw_curves_close (c, status, error);
-  return status == PW_OK && c->panels ? pw_figure_draw (c->folder, (const char *[]){ c->name, NULL }, error) : status;
+static int results_draw (const pw_cli_line *line, const pw_results *r, const void *context, pw_error *error) {
+  pw_curves c;
+  int status = pw_curves_open (&c, line, line->plots, r->name, r->title, error);
+  if (status != PW_OK) return status;
+  r->draw (context, &c);
+  status = pw_curves_close (&c, error);
+  return status == PW_OK && c.panels ? pw_figure_draw (c.folder, (const char *[]){ r->name, NULL }, error) : status;
+}
+
+int pw_results_write (pw_cli_line *line, const pw_results *r, const void *context, pw_error *error) {
+  FILE *table = pw_files_stream (line, RESULTS_TABLE), *summary = pw_files_stream (line, RESULTS_JSON);
+  pw_error drawing = { 0 };
+  if (line->plots) line->drawn = results_draw (line, r, context, &drawing);
+  int status = table ? pw_cli_write_table (line->table, table, context, r->table, error) : PW_OK;
+  if (status == PW_OK && summary) r->json (context, &(pw_json){ .f = summary, .lines = r->lines });
+  if (status == PW_OK) status = pw_files_finish (line, error);
+  if (status != PW_OK && drawing.status != PW_OK) pw_cli_say ("pinwheel: %s\n", drawing.text);
+  if (status != PW_OK) return status;
+  *error = drawing;
+  return line->drawn;
 }

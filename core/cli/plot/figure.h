@@ -34,32 +34,6 @@ int pw_figure_width (const char *text, double *width, pw_error *error);
 pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Options of commands whose results are a table, a summary and figures. */
-#define PW_SUMMARY_OPTIONS(json_help, plots_help)                                                    \
-  PW_TEXT_OPTION (pw_cli_line, json, "json", 0, "FILE", json_help " as JSON; - is standard output"), \
-      PW_TEXT_OPTION (pw_cli_line, plots, "plots", 0, "DIR", plots_help " into a folder"), PW_WIDTH_OPTION
-#define PW_RESULTS_OPTIONS(table_help, json_help, plots_help)                                                 \
-  PW_TEXT_OPTION (pw_cli_line, table, "output", 'o', "FILE.csv", table_help ", or as FILE.npz or FILE.json"), \
-      PW_SUMMARY_OPTIONS (json_help, plots_help)
-
-typedef struct {
-  const char *name; /* of the figures: "steady" */
-  int takes_folder; /* 1: -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood */
-  int lines;        /* pw_json.lines of the summary */
-  /* NULL: the command writes the table itself, to a file that is not opened here */
-  void (*table) (const void *context, pw_cells *c);
-  void (*json) (const void *context, pw_json *j);
-  int (*draw) (const void *context, pw_error *error); /* with --plots */
-} pw_results;
-
-/* Opens what they name.  tables: formats of the table; NULL: there will be none.  reads: a file that the command reads,
- * or without a path.  A status. */
-int pw_results_open (pw_cli_line *line, const pw_results *r, const char *const *tables, pw_use reads, pw_error *error);
-/* Draws figures, then writes table and summary, even if that has failed.  A status. */
-int pw_results_write (pw_cli_line *line, const pw_results *r, const void *context, pw_error *error);
-/* The status in the summary of a search: that of figures, unless it was interrupted or has not converged. */
-const char *pw_results_word (const pw_cli_line *line, int interrupted, int converged);
-
 /* Opens the script NAME.gp; write the variables of its template to it, then end it.  NULL and PW_RESOURCE if it cannot
  * be written. */
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
@@ -96,8 +70,9 @@ typedef struct {
   int type;                /* a sum of PW_PANEL_... */
 } pw_panel;
 
-/* A figure in progress.  Private. */
+/* A figure in progress.  All but the error is private. */
 typedef struct {
+  pw_error error; /* of what adds curves: the figure is not written */
   const char *folder, *name;
   pw_output *data, *script;
   pw_panel panel;
@@ -125,8 +100,35 @@ void pw_curves_add (pw_curves *c, const char *style, const char *label);
 void pw_curves_point (pw_curves *c, double x, double y, double z);
 /* A cell of a map, of style `cells`: the ends in x and in y, and z on the scale of colours; none if z is NaN. */
 void pw_curves_cell (pw_curves *c, const double x[2], const double y[2], double z);
-/* Complete the files, if the status is PW_OK, else discard them; the second one draws the figure.  A status. */
-int pw_curves_close (pw_curves *c, int status, pw_error *error);
-int pw_curves_draw (pw_curves *c, int status, pw_error *error);
+/* Completes the files, unless c->error is set.  A status. */
+int pw_curves_close (pw_curves *c, pw_error *error);
+
+/* ---- Results of commands: a table, a summary, a figure ---- */
+
+/* Options of commands whose results are a table, a summary and figures. */
+#define PW_SUMMARY_OPTIONS(json_help, plots_help)                                                    \
+  PW_TEXT_OPTION (pw_cli_line, json, "json", 0, "FILE", json_help " as JSON; - is standard output"), \
+      PW_TEXT_OPTION (pw_cli_line, plots, "plots", 0, "DIR", plots_help " into a folder"), PW_WIDTH_OPTION
+#define PW_RESULTS_OPTIONS(table_help, json_help, plots_help)                                                 \
+  PW_TEXT_OPTION (pw_cli_line, table, "output", 'o', "FILE.csv", table_help ", or as FILE.npz or FILE.json"), \
+      PW_SUMMARY_OPTIONS (json_help, plots_help)
+
+typedef struct {
+  const char *name, *title; /* of the figure: "steady", "eigenvalues of steady motions" */
+  int takes_folder; /* 1: -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood */
+  int lines;        /* pw_json.lines of the summary */
+  /* NULL: the command writes the table itself, to a file that is not opened here */
+  void (*table) (const void *context, pw_cells *c);
+  void (*json) (const void *context, pw_json *j);
+  void (*draw) (const void *context, pw_curves *c); /* with --plots: adds panels */
+} pw_results;
+
+/* Opens what they name.  tables: formats of the table; NULL: there will be none.  reads: a file that the command reads,
+ * or without a path.  A status. */
+int pw_results_open (pw_cli_line *line, const pw_results *r, const char *const *tables, pw_use reads, pw_error *error);
+/* Draws figures, then writes table and summary, even if that has failed.  A status. */
+int pw_results_write (pw_cli_line *line, const pw_results *r, const void *context, pw_error *error);
+/* The status in the summary of a search: that of figures, unless it was interrupted or has not converged. */
+const char *pw_results_word (const pw_cli_line *line, int interrupted, int converged);
 
 #endif

@@ -593,27 +593,18 @@ static double figures_detail (const pw_plots *plots) {
   return most < 30 ? 0 : most <= 60 ? 0.2 : most <= 120 ? 0.1 : most <= 240 ? 0.05 : 0.02;
 }
 
-static int figures_velocities (const pw_plots *plots, pw_error *error) {
-  pw_curves c;
-  int status = pw_curves_begin (&c, &plots->figures, "velocities", "velocities of the centres of mass", error);
-  if (status != PW_OK) return status;
-  figures_bodies (&c, plots, "vx [m/s]", 3, 0);
-  figures_bodies (&c, plots, "vy [m/s]", 4, 0);
-  return pw_curves_close (&c, PW_OK, error);
+static void figures_velocities (pw_curves *c, const pw_plots *plots) {
+  figures_bodies (c, plots, "vx [m/s]", 3, 0);
+  figures_bodies (c, plots, "vy [m/s]", 4, 0);
 }
 
-static int figures_angular (const pw_plots *plots, pw_error *error) {
-  pw_curves c;
+static void figures_angular (pw_curves *c, const pw_plots *plots) {
   const double detail = figures_detail (plots), t_end = pw_plot_sample (plots, plots->samples - 1)[PLOT_T];
-  const char *title = detail > 0 ? "angular velocities, and their last part in detail" : "angular velocities";
-  int status = pw_curves_begin (&c, &plots->figures, "angular", title, error);
-  if (status != PW_OK) return status;
-  figures_bodies (&c, plots, "ω [rad/s]", 5, 0);
-  if (detail > 0) figures_bodies (&c, plots, "ω [rad/s]", 5, t_end * (1 - detail));
-  return pw_curves_close (&c, PW_OK, error);
+  figures_bodies (c, plots, "ω [rad/s]", 5, 0);
+  if (detail > 0) figures_bodies (c, plots, "ω [rad/s]", 5, t_end * (1 - detail));
 }
 
-static int figures_energy (const pw_plots *plots, pw_error *error) {
+static void figures_energy (pw_curves *c, const pw_plots *plots) {
   static const struct {
     const char *label;
     int place, optional;
@@ -621,20 +612,16 @@ static int figures_energy (const pw_plots *plots, pw_error *error) {
                 { "potential", PLOT_POTENTIAL, 1 },
                 { "dissipated", PLOT_LOSS, 1 },
                 { "work", PLOT_WORK, 0 } };
-  pw_curves c;
-  int status = pw_curves_begin (&c, &plots->figures, "energy", "energy, work and their balance", error);
-  if (status != PW_OK) return status;
-  figures_panel (&c, plots, "energy, work [J]", 0, NULL);
+  figures_panel (c, plots, "energy, work [J]", 0, NULL);
   for (int k = 0; k < 4; k++) {
     int shown = !curve[k].optional;
     for (int i = 0; i < plots->samples; i++) shown |= pw_plot_sample (plots, i)[curve[k].place] != 0;
-    if (shown) figures_curve (&c, plots, curve[k].label, curve[k].place, 0);
+    if (shown) figures_curve (c, plots, curve[k].label, curve[k].place, 0);
   }
-  figures_events (&c, plots);
-  figures_panel (&c, plots, "balance [J]", 0, NULL);
-  figures_curve (&c, plots, NULL, PLOT_BALANCE, 0);
-  figures_events (&c, plots);
-  return pw_curves_close (&c, PW_OK, error);
+  figures_events (c, plots);
+  figures_panel (c, plots, "balance [J]", 0, NULL);
+  figures_curve (c, plots, NULL, PLOT_BALANCE, 0);
+  figures_events (c, plots);
 }
 
 const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BYTES], const char **unit) {
@@ -645,25 +632,21 @@ const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BY
 }
 
 /* A panel for each first-order state and output; no figure without them. */
-static int figures_outputs (const pw_plots *plots, pw_error *error) {
-  pw_curves c;
-  int status = pw_curves_begin (&c, &plots->figures, "outputs", "outputs", error);
-  if (status != PW_OK) return status;
+static void figures_outputs (pw_curves *c, const pw_plots *plots) {
   for (int o = 0; o < plots->outputs; o++) {
     char buffer[PW_NAME_BYTES];
     const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);
-    figures_panel (&c, plots, PW_FIGURE_LABEL (name, unit), 0, NULL);
-    figures_curve (&c, plots, NULL, plots->sample_size - plots->outputs + o, 0);
-    figures_events (&c, plots);
+    figures_panel (c, plots, PW_FIGURE_LABEL (name, unit), 0, NULL);
+    figures_curve (c, plots, NULL, plots->sample_size - plots->outputs + o, 0);
+    figures_events (c, plots);
   }
-  return pw_curves_close (&c, PW_OK, error);
 }
 
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   const char *names[] = { "paths", "mechanism", "velocities", "angular", "energy", plots->outputs ? "outputs" : NULL,
                           NULL };
-  static int (*const curves[]) (const pw_plots *plots, pw_error *error) = { figures_velocities, figures_angular,
-                                                                            figures_energy, figures_outputs };
+  static void (*const curves[]) (pw_curves * c, const pw_plots *plots) = { figures_velocities, figures_angular,
+                                                                           figures_energy, figures_outputs };
   const char *folder = plots->figures.folder;
   if (folder == NULL) return PW_OK;
   if (plots->samples < 2) {
@@ -679,7 +662,16 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
   if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   for (int i = 0; i < 2 && status == PW_OK; i++) status = figures_write (plots, names[i], closeup, error);
-  for (int i = 0; i < 4 && status == PW_OK; i++) status = curves[i](plots, error);
+  for (int i = 0; i < 4 && status == PW_OK; i++) {
+    const char *const title[] = { "velocities of the centres of mass",
+                                  figures_detail (plots) > 0 ? "angular velocities, and their last part in detail"
+                                                             : "angular velocities",
+                                  "energy, work and their balance", "outputs" };
+    pw_curves c;
+    status = pw_curves_begin (&c, &plots->figures, i < 3 ? names[2 + i] : "outputs", title[i], error);
+    if (status == PW_OK) curves[i](&c, plots);
+    if (status == PW_OK) status = pw_curves_close (&c, error);
+  }
   if (status != PW_OK) return status;
   return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
 }

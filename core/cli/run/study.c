@@ -272,7 +272,7 @@ void pw_study_add_curves (const pw_study *study, int group, pw_curves *c, int x,
 }
 
 int pw_study_close_figure (pw_study *study, pw_curves *c, pw_error *error) {
-  int script = 0, status = pw_curves_close (c, PW_OK, error);
+  int script = 0, status = pw_curves_close (c, error);
   while (study->scripts[script]) script++;
   if (c->panels) study->scripts[script] = c->name;
   return status;

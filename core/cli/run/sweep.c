@@ -1242,7 +1242,7 @@ static int draw_by_value (const void *a, const void *b) {
 }
 
 /* Curves over one varied quantity, maps over two. */
-static int sweep_draw (const void *context, pw_error *error) {
+static void sweep_draw (const void *context, pw_curves *c) {
   const pw_sweep *sweep = context;
   const pw_plan *plan = &sweep->plan;
   const pw_axis *axis = plan->grid.axis;
@@ -1251,9 +1251,8 @@ static int sweep_draw (const void *context, pw_error *error) {
   const char *label[2] = { "", "" };
   double range[2][2] = { { INFINITY, -INFINITY }, { INFINITY, -INFINITY } };
   double (*point)[2] = malloc ((size_t)plan->grid.rows * sizeof *point);
-  pw_curves c;
-  if (point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_curves_open (&c, &sweep->line, sweep->line.plots, "sweep", "sweep", error), type = 0;
+  int type = 0;
+  if (point == NULL) pw_fail (&c->error, PW_RESOURCE, "out of memory");
   for (int k = 0; k <= maps; k++) {
     label[k] = pw_figure_label (axis[k].name, axis[k].unit ? axis[k].unit : "", text[k]);
     if (axis[k].value == NULL && axis[k].range.logarithmic) type |= k ? PW_PANEL_LOG_Y : PW_PANEL_LOG_X;
@@ -1263,7 +1262,7 @@ static int sweep_draw (const void *context, pw_error *error) {
       range[k][0] = fmin (range[k][0], end[0]), range[k][1] = fmax (range[k][1], end[1]);
     }
   }
-  for (int o = 0; o < count && status == PW_OK; o++) {
+  for (int o = 0; point && o < count; o++) {
     const struct pw_column *column = plan->outputs ? &plan->output[o] : &plan->column[o];
     const char *name = PW_FIGURE_LABEL (column->name, column->unit ? column->unit : "");
     pw_panel panel = {
@@ -1272,20 +1271,19 @@ static int sweep_draw (const void *context, pw_error *error) {
     memcpy (panel.x, range[0], sizeof panel.x);
     if (maps) memcpy (panel.y, range[1], sizeof panel.y), panel.type |= PW_PANEL_HALF;
     if (!maps) panel.type |= PW_PANEL_BELOW;
-    pw_curves_panel (&c, &panel);
-    pw_curves_add (&c, maps ? "cells" : "line", NULL);
+    pw_curves_panel (c, &panel);
+    pw_curves_add (c, maps ? "cells" : "line", NULL);
     for (long row = 0; row < plan->grid.rows; row++) {
       const double z = plan->drawn[row * count + o];
       double end[2][2];
       for (int k = 0; k <= maps; k++) draw_ends (&axis[k], row / axis[k].stride % axis[k].count, end[k]);
-      if (maps) pw_curves_cell (&c, end[0], end[1], z);
+      if (maps) pw_curves_cell (c, end[0], end[1], z);
       point[row][0] = grid_value (&plan->grid, 0, row), point[row][1] = z;
     }
     if (!maps) qsort (point, (size_t)plan->grid.rows, sizeof *point, draw_by_value);
-    for (long row = 0; row < plan->grid.rows && !maps; row++) pw_curves_point (&c, point[row][0], point[row][1], 0);
+    for (long row = 0; row < plan->grid.rows && !maps; row++) pw_curves_point (c, point[row][0], point[row][1], 0);
   }
   free (point);
-  return pw_curves_draw (&c, status, error);
 }
 
 static void sweep_json (const void *context, pw_json *j) {
@@ -1302,7 +1300,9 @@ static void sweep_json (const void *context, pw_json *j) {
 }
 
 /* The journal stands for the table. */
-static const pw_results sweep_results = { .name = "sweep", .lines = 1, .json = sweep_json, .draw = sweep_draw };
+static const pw_results sweep_results = {
+  .name = "sweep", .title = "sweep", .lines = 1, .json = sweep_json, .draw = sweep_draw
+};
 
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
   int status = pw_cli_file (&sweep->line, error);
