@@ -115,7 +115,7 @@ int pw_curves_close (pw_curves *c, pw_error *error);
 
 typedef struct {
   const char *name, *title; /* of the figure: "steady", "eigenvalues of steady motions" */
-  int takes_folder; /* 1: -o DIR, an old spelling of `-o DIR/NAME.csv --json DIR/NAME.json --plots DIR`, is understood */
+  int takes_folder; /* 1: -o DIR is understood, an old spelling of -o DIR/NAME.csv --json DIR/NAME.json --plots DIR */
   int lines;        /* pw_json.lines of the summary */
   /* NULL: the command writes the table itself, to a file that is not opened here */
   void (*table) (const void *context, pw_cells *c);
