@@ -49,7 +49,7 @@ source_of () {
 #include <cvodes/cvodes.h>
 #include <arkode/arkode_erkstep.h>
 #include <nvector/nvector_serial.h>
-int try_sundials (void) { return SUNContext_Create && IDAInit && CVodeInit && ERKStepCreate && N_VNew_Serial; }
+int try_sundials (void) { return SUNContext_Create && IDASetEtaFixedStepBounds && CVodeInit && ERKStepCreate && N_VNew_Serial; }
 C
   suitesparse) cat <<'C' ;;
 #include <klu.h>
@@ -160,7 +160,7 @@ fi
 echo "deps: missing:$missing"
 
 if ! command -v apt-get >/dev/null; then
-  echo "deps: no apt here: please install what is missing of a C compiler, SUNDIALS (6.0 or later), SuiteSparse, LAPACKE," \
+  echo "deps: no apt here: please install what is missing of a C compiler, SUNDIALS (6.2 or later), SuiteSparse, LAPACKE," \
     "libfyaml, popt, GSL, NLopt, cmocka and gnuplot, with their headers; then say NO_DEPS=1" >&2
   exit 1
 fi
@@ -197,7 +197,7 @@ fi
 look
 if [ -n "$missing" ]; then
   echo "deps: still missing after installing:$missing" >&2
-  case $missing in *sundials*) echo "deps: SUNDIALS must be 6.0 or later" >&2 ;; esac
+  case $missing in *sundials*) echo "deps: SUNDIALS must be 6.2 or later" >&2 ;; esac
   sed 's/^/  /' "$work/log" | head -20 >&2
   exit 1
 fi

@@ -12,20 +12,54 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
                    CV_LSETUP_FAIL == IDA_LSETUP_FAIL && CV_TOO_MUCH_ACC == IDA_TOO_MUCH_ACC,
                "CVODES and IDAS have the same flags");
 
-/* Serial vectors with faster sums and products than those of SUNDIALS: a step of high order adds dozens of vectors of a
- * dozen entries, in libraries that distributions may build without optimisation.  They round like those of SUNDIALS,
- * except that SUNDIALS computes a x + a y as a (x + y) and a x - a y as a (x - y). */
+/* Serial vectors with faster operations than those of SUNDIALS: a step of high order adds dozens of vectors of a dozen
+ * entries, in libraries that distributions may build without optimisation.  They round like those of SUNDIALS, except
+ * that SUNDIALS computes a x + a y as a (x + y) and a x - a y as a (x - y). */
 
 static void vectors_linear_sum (realtype a, N_Vector vx, realtype b, N_Vector vy, N_Vector vz) {
+  const sunindextype n = NV_LENGTH_S (vz);
   const double *x = NV_DATA_S (vx), *y = NV_DATA_S (vy);
   double *z = NV_DATA_S (vz);
-  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = a * x[i] + b * y[i];
+  sunindextype i = 0;
+  for (; i + 1 < n; i += 2) *(pw_pair *)(z + i) = a * PW_PAIR (x, i) + b * PW_PAIR (y, i);
+  if (i < n) z[i] = a * x[i] + b * y[i];
 }
 
 static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
+  const sunindextype n = NV_LENGTH_S (vz);
   const double *x = NV_DATA_S (vx);
   double *z = NV_DATA_S (vz);
-  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c * x[i];
+  sunindextype i = 0;
+  for (; i + 1 < n; i += 2) *(pw_pair *)(z + i) = c * PW_PAIR (x, i);
+  if (i < n) z[i] = c * x[i];
+}
+
+/* z = sum_k c_k x_k */
+static int vectors_combine (int count, realtype *c, N_Vector *x, N_Vector vz) {
+  const sunindextype n = NV_LENGTH_S (vz);
+  double *z = NV_DATA_S (vz);
+  sunindextype i = 0;
+  for (; i + 3 < n; i += 4) {
+    pw_pair sum = { 0 }, next = { 0 };
+    for (int k = 0; k < count; k++) {
+      const double *y = NV_DATA_S (x[k]);
+      sum += c[k] * PW_PAIR (y, i);
+      next += c[k] * PW_PAIR (y, i + 2);
+    }
+    *(pw_pair *)(z + i) = sum;
+    *(pw_pair *)(z + i + 2) = next;
+  }
+  for (; i < n; i++) {
+    double sum = 0;
+    for (int k = 0; k < count; k++) sum += c[k] * NV_DATA_S (x[k])[i];
+    z[i] = sum;
+  }
+  return 0;
+}
+
+static void vectors_fill (realtype c, N_Vector vz) {
+  double *z = NV_DATA_S (vz);
+  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c;
 }
 
 /* sqrt (sum (x_i w_i)^2 / n), with the n of all entries; unless id is NULL, the sum is over id_i > 0 only. */
@@ -51,6 +85,8 @@ N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
   if (v == NULL) return NULL;
   v->ops->nvlinearsum = vectors_linear_sum;
   v->ops->nvscale = vectors_scale;
+  v->ops->nvlinearcombination = vectors_combine;
+  v->ops->nvconst = vectors_fill;
   v->ops->nvwrmsnorm = vectors_norm;
   v->ops->nvwrmsnormmask = vectors_norm_masked;
   return v;
@@ -230,21 +266,32 @@ char *pw_library_versions (char *buffer, size_t size) {
 static const double quadrature_node[] = { 0.8611363115940526, 0.3399810435848563 },
                     quadrature_weight[] = { 0.3478548451374538, 0.6521451548625461 };
 
+/* The same with eight nodes, exact up to degree 15. */
+static const double fine_node[] = { 0.9602898564975363, 0.7966664774136267, 0.5255324099163290, 0.1834346424956498 },
+                    fine_weight[] = { 0.1012285362903763, 0.2223810344533745, 0.3137066458778873, 0.3626837833783620 };
+
 /* x->integral: between two times, of the polynomial of this degree through the rates at the newest states (Lagrange's
  * formula); x->node: less that of the polynomial of the next lower degree (Newton's formula). */
 static void quadrature_polynomial (const pw_sun *x, int degree, double from, double to) {
   const int entries = x->run->entries;
   const double half = (to - from) / 2;
   double last = 0; /* integral of the product of t - t_j, j < degree */
+  const int pairs = degree > 7 ? 4 : 2;
+  const double *node = degree > 7 ? fine_node : quadrature_node, *weight = degree > 7 ? fine_weight : quadrature_weight;
+  pw_pair at[4], product[4]; /* nodes, from `from` on; there, the product of all t - t_j, weighted */
   memset (x->integral, 0, (size_t)entries * sizeof *x->integral);
   memset (x->node, 0, (size_t)entries * sizeof *x->node);
+  for (int k = 0; k < pairs; k++) {
+    at[k] = half * (pw_pair){ 1 - node[k], 1 + node[k] };
+    product[k] = (pw_pair){ half, half } * weight[k];
+    for (int j = 0; j <= degree; j++) product[k] *= at[k] - (x->t[j] - from);
+  }
   for (int i = degree; i >= 0; i--) {
+    const double t = x->t[i] - from;
     double sum = 0, at_node = 1;
-    for (int k = 0; k < 4; k++) {
-      const double t = from + half + (k < 2 ? -half : half) * quadrature_node[k % 2];
-      double product = half * quadrature_weight[k % 2];
-      for (int j = 0; j <= degree; j++) product *= j == i ? 1 : t - x->t[j];
-      sum += product;
+    for (int k = 0; k < pairs; k++) {
+      const pw_pair part = product[k] / (at[k] - t);
+      sum += part[0] + part[1];
     }
     for (int j = 0; j <= degree; j++) at_node *= j == i ? 1 : x->t[i] - x->t[j];
     if (i == degree) last = sum;

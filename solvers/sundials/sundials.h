@@ -9,7 +9,7 @@
 #include "tangent.h"
 #include "sparse.h"
 
-enum { PW_SUN_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
+enum { PW_SUN_POINTS = 14 }; /* at most: those of a polynomial of a degree above the order 12 */
 
 /* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes the run's
  * sample arrays, the kinematics, J and the saddle's factors.  PW_OK, or another status if they cannot be evaluated. */
