@@ -606,8 +606,8 @@ int pw_impulses_predict (pw_run *r) {
   return changed;
 }
 
-/* Lists D, with the limits of what impulses add to those of the predicted multipliers: equations that held at the
- * beginning of the step, those of velocities, and those of positions whose g has left its side. */
+/* Lists D, with the limits of impulses in a step, those of the predicted multipliers included: equations that held at
+ * the beginning of the step, those of velocities, and those of positions whose g has left its side. */
 static void impulses_list (pw_run *r, double h, const double *g) {
   pw_events *x = r->events;
   x->d.n = x->jumped = 0;
@@ -627,7 +627,7 @@ static void impulses_list (pw_run *r, double h, const double *g) {
     const int slides = one_sided || fabs (before) <= PW_MODES_SMALL ? 0 : x->mode[i];
     const double lo = slides < 0 ? x->limit[i].sliding[0] : x->limit[i].least;
     const double hi = slides > 0 ? x->limit[i].sliding[1] : x->limit[i].most;
-    pw_modes_add (x, i, h * (lo - x->mean[i]), h * (hi - x->mean[i]), x->mode[i]);
+    pw_modes_add (x, i, h * lo, h * hi, x->mode[i]);
   }
 }
 
@@ -644,7 +644,10 @@ int pw_impulses_solve (pw_run *r, pw_projector *p, double h, double t, const dou
   impulses_list (r, h, x->now);
   pw_modes_matrix (r, r->saddle);
   int count = -1;
-  if (pw_modes_decide_sliding (x, h, x->mean, &count) != PW_OK) return pw_modes_fail (r, r->saddle, count, error);
+  for (int k = 0; k < x->d.n; k++) /* impulses include those of the predicted multipliers, which u already has */
+    for (int i = 0; i < x->d.n; i++) x->d.b[k] += x->d.A[k * x->d.n + i] * h * x->mean[x->d.list[i]];
+  if (pw_modes_decide_sliding (x, h, &count) != PW_OK) return pw_modes_fail (r, r->saddle, count, error);
+  for (int k = 0; k < x->d.n; k++) x->d.x[k] -= h * x->mean[x->d.list[k]];
   pw_modes_push (r, r->saddle, v);
   if (pw_update_velocities (r->w, v) != PW_OK) return pw_fail_signal (t, error);
   pw_modes_end_impact (r, v);

@@ -491,14 +491,12 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
   if (r->update_given) r->update_given (r);
 }
 
-int pw_modes_decide_sliding (pw_events *x, double unit, const double *known, int *count) {
+int pw_modes_decide_sliding (pw_events *x, double unit, int *count) {
   for (int again = 1; again;) {
     if (pw_decide (&x->d, count) != PW_OK) return PW_RETRY;
     again = 0;
     for (int k = 0; k < x->d.n; k++) {
-      const int i = x->d.list[k];
-      const double from = known ? known[i] : 0, *sliding = x->limit[i].sliding;
-      const double lo = unit * (sliding[0] - from), hi = unit * (sliding[1] - from);
+      const double *sliding = x->limit[x->d.list[k]].sliding, lo = unit * sliding[0], hi = unit * sliding[1];
       if (x->d.trial[k] > 0 && x->d.hi[k] > hi) x->d.hi[k] = hi, again = 1;
       if (x->d.trial[k] < 0 && x->d.lo[k] < lo) x->d.lo[k] = lo, again = 1;
     }
@@ -510,7 +508,7 @@ int pw_modes_decide_sliding (pw_events *x, double unit, const double *known, int
 static int decide_modes (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   pw_saddle *saddle = x->d.n > 0 ? pw_modes_open_decision (r, 0, error) : NULL;
-  int count = -1, status = saddle ? pw_modes_decide_sliding (x, 1, NULL, &count) : PW_OK;
+  int count = -1, status = saddle ? pw_modes_decide_sliding (x, 1, &count) : PW_OK;
   if (x->d.n > 0 && (saddle == NULL || status != PW_OK || pw_decision_contradicts (&x->d)))
     status = pw_modes_fail (r, saddle, count, error);
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {

@@ -99,9 +99,9 @@ pw_saddle *pw_modes_open_decision (pw_run *r, int impact, pw_error *error);
 /* Evaluates A with the saddle of the other equations, which must be factorised. */
 void pw_modes_matrix (pw_run *r, pw_saddle *saddle);
 
-/* pw_decide, where an equation that slides may have a smaller multiplier than one that holds.  x are `unit` times what
- * multipliers exceed `known` by (NULL: 0). */
-int pw_modes_decide_sliding (pw_events *x, double unit, const double *known, int *count);
+/* pw_decide, where an equation that slides may have a smaller multiplier than one that holds.  x are `unit` times
+ * multipliers. */
+int pw_modes_decide_sliding (pw_events *x, double unit, int *count);
 
 /* Adds to v the velocities of the impulses -x on D; impulses of the other equations in x->lambda. */
 void pw_modes_push (pw_run *r, pw_saddle *saddle, double *v);

@@ -20,7 +20,6 @@ from simulator import Failure, Mechanism
 REFINEMENTS = 5
 CLOSE = 1e-3  # [s] events closer to each other than this are not compared one by one
 LEAST = 1e-7  # errors below are accepted: impacts that accumulate end in units of 1e-6, and so differ by their square
-CIRCLES = 2e-5  # errors of fixed steps where a vector hardly begins to slide: its direction is not resolved
 SENSITIVE = 0.05  # largest fraction of comparisons of sensitive motions
 
 
@@ -92,8 +91,6 @@ class Case:
             return True
         if integrator not in STEP:
             return e < LEAST + FACTOR[integrator] * RTOL[integrator] / 10**refine
-        if self.circles and refine == REFINEMENTS - 1 and e < CIRCLES:
-            return True
         smaller = refine > 0 and e < history[-2][group] / 2**(self.order(integrator) - 0.6)
         return e < LEAST or smaller and e < 1e-2
 
