@@ -158,6 +158,7 @@ typedef struct {
     pw_pulse pulse;       /* PW_PULSE */
     pw_points table;      /* PW_TABLE */
   };
+  int specified; /* of a limit: 1: it limits even if it is constant 0; text models set this */
 } pw_signal;
 
 /* A form of signal described by numbers; checks, text models, `show` and `list signals` use it. */
@@ -456,7 +457,8 @@ typedef struct {
   pw_path *path;              /* a spline in place of the line, where the disc fits everywhere; NULL: none */
   double restitution;         /* normal velocity after an impact over that before it, 0 to 1 */
   double mu;                  /* largest friction over normal force; 0: no friction */
-  double mu_sliding;          /* the same while it slides, at most mu; 0: mu */
+  double mu_sliding;          /* the same while it slides, at most mu; 0 and not specified: mu */
+  int specified;              /* 1: mu_sliding is specified even if it is 0 */
 } pw_contact;
 
 /* Freewheel: body 1 does not turn more slowly than body 2.  One nonholonomic constraint equation. */
@@ -470,8 +472,8 @@ typedef struct {
   const char *name, *body;
   double at[2];           /* contact point in the body's frame [m] */
   double heading;         /* rolling direction in the body's frame [rad] */
-  pw_signal grip;         /* largest lateral force [N]; constant 0: no limit */
-  pw_signal grip_sliding; /* lateral force while sliding [N], at most the grip; constant 0: the grip */
+  pw_signal grip;         /* largest lateral force [N]; 0 and not specified: no limit */
+  pw_signal grip_sliding; /* lateral force while sliding [N], at most the grip; 0 and not specified: the grip */
 } pw_wheel;
 
 /* Rolling wheel: the contact point moves neither across the heading nor, except by rolling, along it.  Two
@@ -556,7 +558,7 @@ typedef struct {
   double viscous;             /* [N m s/rad], >= 0 */
   double speed;    /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
   pw_signal limit; /* Coulomb torque [N m], >= 0; constant if it is smoothed */
-  pw_signal limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; constant 0: the limit */
+  pw_signal limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; 0 and not specified: it */
 } pw_friction;
 
 /* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body 2,
@@ -568,7 +570,7 @@ typedef struct {
   double viscous;  /* [N s/m], >= 0 */
   double speed;    /* below about this speed the Coulomb force is smoothed [m/s]; 0: it is exact, and holds */
   pw_signal limit; /* Coulomb force [N], >= 0; constant if it is smoothed */
-  pw_signal limit_sliding; /* exact Coulomb force while sliding [N], at most the limit; constant 0: the limit */
+  pw_signal limit_sliding; /* exact Coulomb force while sliding [N], at most the limit; 0 and not specified: it */
 } pw_sliding_friction;
 
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
@@ -605,7 +607,8 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the driven body, the body with the reaction; "ground" for one of them */
   double stiffness, damping;  /* torque per error of angle [N m/rad], of angular velocity [N m s/rad]; >= 0 */
-  double limit;               /* largest torque [N m]; 0: no limit */
+  double limit;               /* largest torque [N m]; 0 and not specified: no limit */
+  int specified;              /* 1: the limit is specified even if it is 0 */
   pw_signal angle, rate;      /* targets of phi1 - phi2 [rad], of omega1 - omega2 [rad/s] */
 } pw_motor;
 

@@ -254,7 +254,9 @@ static int build_value (pw_reader *r, const pw_node *node, int i, void *to) {
   case PW_BODY:
     return build_body_name (r, node, to);
   case PW_SIGNAL:
-    return pw_yaml_signal (r, node, to);
+    pw_yaml_signal (r, node, to);
+    ((pw_signal *)to)->specified = r->field->limit;
+    return r->error->status;
   case PW_CHOICE:
     return pw_yaml_choice (r, node, r->label, r->field->choices, to);
   case PW_TEXT:

@@ -117,9 +117,14 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
     name, unit, NULL, about          \
   }
 
-/* 1 if a limit is a signal other than 0, its default. */
-static inline int limit_given (const pw_signal *limit) {
+/* 1 if a limit is a signal other than 0. */
+static inline int limit_is_nonzero (const pw_signal *limit) {
   return limit->type != PW_CONSTANT || limit->constant != 0;
+}
+
+/* 1 if a limit is specified, be it 0. */
+static inline int limit_given (const pw_signal *limit) {
+  return limit->specified || limit_is_nonzero (limit);
 }
 
 /* Checks the limit of a multiplier while its equation holds, and that at which it does not (default: the same), as far
@@ -132,14 +137,14 @@ static inline int limit_check (const char *field, const pw_signal *most, const p
   if (sliding->type == PW_CONSTANT && sliding->constant > largest)
     return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding->constant, field,
                     largest);
-  if (!limit_given (most) && limit_given (sliding))
+  if (!limit_given (most) && limit_is_nonzero (sliding))
     return pw_fail (error, PW_INPUT, "%s_sliding without %s", field, field);
   return PW_OK;
 }
 
 /* pw_kind.limits of a multiplier between opposite limits, if they are given. */
 static inline void limit_both_sides (const pw_signal *most, const pw_signal *sliding, pw_bounds *limit) {
-  if (!limit_given (most)) return;
+  if (!limit_given (most)) return; /* constant 0 is a limit, with which the equation never holds */
   if (!limit_given (sliding)) sliding = most;
   *limit = (pw_bounds){ -most->constant, most->constant, { -sliding->constant, sliding->constant }, .circle = 0 };
   if (most->type != PW_CONSTANT) limit->least = -DBL_MAX, limit->most = DBL_MAX, limit->signal[0] = most;

@@ -105,12 +105,12 @@ PER_ELEMENT (contact_place, contact, 3) {
   }
 
 /* Fields of the definition of a wheel that may slide, after its other signals. */
-#define GRIP_FIELDS(type)                                                                                    \
-  { PW_AT (type, grip), PW_SIGNAL, .limit = 1, .unit = "N",                                                  \
-    .about = "largest lateral force, beyond which the wheel slides; 0: no limit" },                          \
-  {                                                                                                          \
-    PW_AT (type, grip_sliding), PW_SIGNAL, .limit = 1, .unit = "N",                                          \
-                                           .about = "lateral force while it slides; 0: as large as the grip" \
+#define GRIP_FIELDS(type)                                                                               \
+  { PW_AT (type, grip), PW_SIGNAL, .limit = 1, .unit = "N",                                             \
+    .about = "largest lateral force, beyond which the wheel slides; left out: no limit" },              \
+  {                                                                                                     \
+    PW_AT (type, grip_sliding), PW_SIGNAL, .limit = 1, .unit = "N",                                     \
+                                           .about = "lateral force while it slides; left out: the grip" \
   }
 
 /* Fields of the definition of a wheel: its contact point and its heading. */

@@ -33,8 +33,8 @@ static inline int coulomb_make_smooth (double viscous, const pw_signal *limit, c
                                        coulomb *law, pw_error *error) {
   if (limit->type != PW_CONSTANT)
     return pw_fail (error, PW_INPUT, "limit: a signal: expected a number, unless friction is exact: no speed");
-  if (limit_given (sliding))
-    return pw_fail (error, PW_INPUT, "limit_sliding: expected 0, unless friction is exact: a limit, no speed");
+  if (limit_is_nonzero (sliding))
+    return pw_fail (error, PW_INPUT, "limit_sliding: expected none, unless friction is exact: a limit, no speed");
   if (limit->constant < 0) return limit_check ("limit", limit, sliding, error);
   return coulomb_make (viscous, limit->constant, speed, law, error);
 }
@@ -66,7 +66,7 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
 #define EXACT_COULOMB(type, definition_type)                                \
   static int type##_is_exact (const void *definition) {                     \
     const definition_type *x = definition;                                  \
-    return limit_given (&x->limit) && x->speed == 0;                        \
+    return limit_is_nonzero (&x->limit) && x->speed == 0;                   \
   }                                                                         \
   static void type##_limits (const void *definition, pw_bounds *limit) {    \
     const definition_type *x = definition;                                  \

@@ -228,7 +228,7 @@ static int stability_mathieu (void *context, double t, const double *x, double v
 
 static const char *const stability_reads[] = { "body.phi", NULL };
 static const pw_signal stability_torques[] = {
-  { PW_CONSTANT, { 0 } },
+  { .constant = 0 },
   { PW_HARMONIC, .harmonic = { 1, 3, -PW_PI / 2, 0 } },
   { PW_SMOOTH_STEP, .ramp = { .from = 0, .to = 1, .start = 3, .duration = 1 } },
   { PW_FUNCTION, .function = { .eval = stability_reader, .reads = stability_reads } },

@@ -17,7 +17,7 @@
 
 LAYOUT (pw_error, 504);
 LAYOUT (pw_function, 72);
-LAYOUT (pw_signal, 80);
+LAYOUT (pw_signal, 88);
 LAYOUT (pw_signal_text, 32);
 LAYOUT (pw_body, 88);
 LAYOUT (pw_parameter, 48);
@@ -238,17 +238,17 @@ TEST (definitions) {
     { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
     { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
     { "stop", 0x140184392f9eeb3b },          { "rope", 0x63fe52bab6421076 },
-    { "contact", 0xe6991d720708c124 },       { "freewheel", 0x1b30733283cdb584 },
-    { "drive", 0x411a773ee985283e },         { "wheel", 0x44c28886978b8995 },
-    { "rolling-wheel", 0x62087bb54a6fb124 }, { "steered-wheel", 0x61914357e448d9d4 },
-    { "speed", 0x1dcb4d3e4aa0019 },          { "pfaffian", 0xd67d402c10e7ea82 },
+    { "contact", 0x6a96e4785884d24c },       { "freewheel", 0x1b30733283cdb584 },
+    { "drive", 0x4a0acb8a2a058e06 },         { "wheel", 0x2253ff33946cd27d },
+    { "rolling-wheel", 0x22018cdff897fb65 }, { "steered-wheel", 0x4d59c3fe7efd1064 },
+    { "speed", 0x1c914294429d6241 },         { "pfaffian", 0x2821cc1abfffa77a },
     { "tyre", 0xa42b832e02a24eda },          { "rolling-resistance", 0x267227c53db66752 },
     { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
-    { "friction", 0xd3ba33d9e68aea5c },      { "sliding-friction", 0x31a4dd09485c61fc },
+    { "friction", 0xb489bb9d66b7e9b4 },      { "sliding-friction", 0x5fd1939a23f75811 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
-    { "force", 0xa4714ae6293ae481 },         { "on-curve", 0x3873c2d06bfab935 },
-    { "torque", 0x56ce7517b87a0d1 },         { "motor", 0x2b2669f3651b0819 },
-    { "state", 0x8f355e8c737f94b8 },         { "marker", 0xa45ad3f1c6e75b4a },
+    { "force", 0x74eb3b9f27c269 },           { "on-curve", 0xd956d93e2d1765bd },
+    { "torque", 0xd760d1152b443519 },        { "motor", 0xf10d838c7437bc39 },
+    { "state", 0xbd1a13601c72c5f8 },         { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {

@@ -38,7 +38,7 @@ static const pw_field friction_fields[] = {
     .about = "below about this angular velocity the Coulomb torque is smoothed; left out: it is exact, and holds" },
   { PW_AT (pw_friction, limit), PW_SIGNAL, .limit = 1, .unit = "N m", .about = "Coulomb torque" },
   { PW_AT (pw_friction, limit_sliding), PW_SIGNAL, .limit = 1, .unit = "N m",
-    .about = "exact Coulomb torque while sliding, at most the limit; 0: the limit" },
+    .about = "exact Coulomb torque while sliding, at most the limit; left out: the limit" },
   { .name = NULL },
 };
 

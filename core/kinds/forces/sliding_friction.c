@@ -71,7 +71,7 @@ static const pw_field sliding_fields[] = {
     .about = "below about this speed the Coulomb force is smoothed; left out: it is exact, and holds" },
   { PW_AT (pw_sliding_friction, limit), PW_SIGNAL, .limit = 1, .unit = "N", .about = "Coulomb force" },
   { PW_AT (pw_sliding_friction, limit_sliding), PW_SIGNAL, .limit = 1, .unit = "N",
-    .about = "exact Coulomb force while sliding, at most the limit; 0: the limit" },
+    .about = "exact Coulomb force while sliding, at most the limit; left out: the limit" },
   { .name = NULL },
 };
 

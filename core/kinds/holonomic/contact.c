@@ -279,7 +279,7 @@ static void rub_loss (const pw_batch *batch, double *out) {
 
 static void rub_limits (const void *definition, pw_bounds *limit) {
   const pw_contact *x = definition;
-  const double sliding = x->mu_sliding > 0 ? x->mu_sliding : x->mu;
+  const double sliding = x->specified || x->mu_sliding > 0 ? x->mu_sliding : x->mu;
   if (x->mu == 0) return;
   *limit = (pw_bounds){ -x->mu, x->mu, { -sliding, sliding }, .initially_slides = 1, .relative = 1 };
 }
@@ -304,8 +304,8 @@ static const pw_field touch_fields[] = {
     .about = "normal velocity after an impact over that before it" },
   { PW_AT (pw_contact, mu), PW_NUMBER, .domain = PW_NONNEGATIVE,
     .about = "largest friction over normal force; 0: no friction" },
-  { PW_AT (pw_contact, mu_sliding), PW_NUMBER, .domain = PW_NONNEGATIVE,
-    .about = "the same while it slides, at most mu; 0: mu" },
+  { PW_AT (pw_contact, mu_sliding), PW_NUMBER, .domain = PW_NONNEGATIVE, .given = offsetof (pw_contact, specified),
+    .about = "the same while it slides, at most mu; left out: mu" },
   { .name = NULL },
 };
 

@@ -39,7 +39,7 @@ static double rolling_spin_rate (const rolling *element, const pw_body *body) {
 
 static int rolling_slips (const void *definition) {
   const pw_rolling_wheel *x = definition;
-  return limit_given (&x->grip) || limit_given (&x->grip_sliding) || limit_given (&x->brake);
+  return limit_given (&x->grip) || limit_given (&x->grip_sliding) || limit_is_nonzero (&x->brake);
 }
 
 PREPARE (rolling_prepare, pw_rolling_wheel, rolling) {
@@ -94,7 +94,7 @@ static void slipping_limits (const void *definition, pw_bounds *limit) {
   const pw_rolling_wheel *x = definition;
   for (int i = 0; i < 2; i++) {
     limit_both_sides (&x->grip, &x->grip_sliding, limit + i);
-    limit[i].circle = limit_given (&x->grip) ? i + 1 : 0;
+    limit[i].circle = limit_is_nonzero (&x->grip) ? i + 1 : 0;
   }
   limit[2].least = limit[2].most = 0;
   limit_both_sides (&x->brake, &x->brake, limit + 2);
@@ -140,10 +140,10 @@ static const pw_field rolling_fields[] = {
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
     .about = "torque on the wheel about its axle; positive: drives along the heading" },
   { PW_AT (pw_rolling_wheel, grip), PW_SIGNAL, .limit = 1, .unit = "N",
-    .about =
-        "largest force of the ground, lateral and longitudinal together, beyond which the wheel slides; 0: no limit" },
+    .about = "largest force of the ground, lateral and longitudinal together, beyond which the wheel slides; left out: "
+             "no limit" },
   { PW_AT (pw_rolling_wheel, grip_sliding), PW_SIGNAL, .limit = 1, .unit = "N",
-    .about = "this force while it slides; 0: as large as the grip" },
+    .about = "this force while it slides; left out: the grip" },
   { PW_AT (pw_rolling_wheel, brake), PW_SIGNAL, .limit = 1, .unit = "N m",
     .about = "largest torque of a brake, which opposes the spin and holds the wheel" },
   { .name = NULL },
