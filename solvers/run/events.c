@@ -513,7 +513,7 @@ int pw_events_spare (pw_run *r, pw_error *error) {
 int pw_events_begin (pw_run *r, pw_error *error) {
   if (r->events == NULL) return PW_OK;
   events_units (r);
-  r->events->longest = EVENTS_FIRST * r->w->scale.time;
+  r->events->longest = EVENTS_FIRST * r->w->scale.time, r->events->stride = INFINITY;
   int status = pw_modes_decide (r, 1, error);
   if (status == PW_OK) status = pw_run_open_saddle (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
@@ -704,6 +704,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->direction, (size_t)x->count * sizeof *x->direction);
   pw_archive_bytes (a, x->bias, (size_t)x->count * sizeof *x->bias);
   pw_archive_bytes (a, x->reach, (size_t)x->count * sizeof *x->reach);
+  pw_archive_bytes (a, &x->stride, sizeof x->stride);
   pw_archive_bytes (a, &x->pending, sizeof x->pending);
   pw_archive_bytes (a, &x->fell, sizeof x->fell);
   pw_archive_bytes (a, x->mean, (size_t)x->count * sizeof *x->mean);

@@ -20,7 +20,7 @@
  * of the sample by round-off, about 1e-12 of the limit, which must not undo the event. */
 #define MODES_TIGHTER 1e-10
 #define CIRCLE_LAG 5e-4       /* of the direction of a circle (circle_longest) */
-#define CIRCLE_FIRST 1e-6     /* [T] first step after an event: u leaves 0 by more than round-off */
+#define CIRCLE_FIRST 1e-6     /* [T] first fixed step of a circle that slides: u leaves 0 by more than round-off */
 enum { CIRCLE_PARTS = 1024 }; /* into which a step is divided at most where that direction turns */
 enum { MODES_IMPACTS = 10 };  /* most at one instant, after which all their equations hold */
 
@@ -150,10 +150,10 @@ static double circle_reach (const pw_run *r, int i, double rate) {
 
 /* The longest step that follows the direction of a circle that slides, with this A L.  |u| does not fall below half.
  * Where it is small, but not round-off, e is 0 or the lag of d behind n, of the rate w, which is about w A L h^2 / |u|,
- * below CIRCLE_LAG.  There fixed steps begin short after an event, and double. */
+ * below CIRCLE_LAG; fixed steps begin short where it begins to slide, and double. */
 static double circle_longest (pw_run *r, int i, double rate) {
   pw_events *x = r->events;
-  const double h = circle_reach (r, i, rate) / rate, last = r->t - x->previous_t, T = r->w->scale.time;
+  const double h = circle_reach (r, i, rate) / rate;
   const double u[2] = { circle_speed (r->w, x->row[i]), circle_speed (r->w, x->row[i + 1]) }, size = hypot (u[0], u[1]);
   const int near = size<4 * h * rate, moves = size> PW_MODES_SMALL * x->unit[i];
   double longest = INFINITY, a[2], shortest = near ? h / CIRCLE_PARTS : h;
@@ -161,7 +161,7 @@ static double circle_longest (pw_run *r, int i, double rate) {
   pw_evaluate_gamma (r->w, x->gamma);
   for (int m = 0; m < 2; m++) a[m] = x->lambda[x->row[i + m]] - x->gamma[x->row[i + m]];
   const double along = u[0] * a[0] + u[1] * a[1], turn = fabs (u[0] * a[1] - u[1] * a[0]);
-  if (near && r->fixed_steps) longest = isnan (last) ? CIRCLE_FIRST * T : 2 * last;
+  if (near && r->fixed_steps) longest = x->stride;
   if (near && moves)
     longest = fmin (longest, fmax (size / (4 * rate), size * sqrt (CIRCLE_LAG * size / (rate * turn))));
   if (moves && along < 0) longest = fmin (longest, -size * size / (2 * along));
@@ -182,6 +182,7 @@ double pw_modes_begin_step (pw_run *r) {
     x->reach[i] = fmin (circle_reach (r, i, rate), longest * rate);
     x->bias[i] = fmax (0, x->reach[i] - speed / 4);
   }
+  x->stride *= 2;
   return longest;
 }
 
@@ -517,7 +518,9 @@ static int decide_modes (pw_run *r, pw_error *error) {
     x->still[i] = (unsigned char)pw_decision_rests (&x->d, k);
     x->spare[i] = x->d.redundant[k] && !apart;
     x->direction[i] = x->d.towards[k];
-    if (x->limit[i].circle == 1) x->bias[i] = x->reach[i] = circle_reach (r, i, circle_rate (r, i));
+    if (x->limit[i].circle != 1) continue;
+    x->bias[i] = x->reach[i] = circle_reach (r, i, circle_rate (r, i));
+    if (x->mode[i] && x->before[i] == 0) x->stride = CIRCLE_FIRST * r->w->scale.time;
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     const int i = x->d.list[k], circle = x->limit[i].circle;

@@ -33,6 +33,7 @@ typedef struct pw_events {
   double *start, *end, *previous, *now; /* 2 count: event functions at the ends of the last step, before it, anywhere */
   double start_t, previous_t;           /* NaN: not known */
   double longest, roughness; /* next adaptive step [s]; the bend of multipliers in the last one over EVENTS_BEND */
+  double stride;             /* longest next fixed step [s] where a circle has begun to slide, and u is small */
   double *memory;            /* of pw_first_crossing */
   double *u, *u_before, *impulse;
   const unsigned char *origin;      /* of initial values: of the run; NULL in a restart */
