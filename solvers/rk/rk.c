@@ -953,13 +953,15 @@ static int several_possible (const pw_run *r) {
 static int several_count (const pw_run *r, double t, double t_end) {
   const double h = r->settings.step, longer = PW_STEP_LONGER * h,
                last = fmin (r->breakpoint, r->resolved_until) - longer, stop = fmin (t_end - longer, last),
-               shortest = 128 * DBL_EPSILON;
-  int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
-  double reached = r->t;
-  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->checked_span) {
-    double next = r->counter.base + (double)(r->counter.count + n + 1) * h;
-    if (!(next <= stop || (next == t_end && next <= last)) || !(h > shortest * fabs (next))) break;
-    reached = next, n++;
+               until = fmin (fmin (t, t_end), r->settings.t + 2 * r->checked_span);
+  const int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL);
+  double reached = r->t, number = (double)r->counter.count;
+  int n = 0;
+  if (!(h > 128 * DBL_EPSILON * (fabs (r->t) + most * h))) return 0;
+  for (; n < most && reached < until; n++) {
+    const double next = r->counter.base + ++number * h;
+    if (!(next <= stop || (next == t_end && next <= last))) break;
+    reached = next;
   }
   return n;
 }
