@@ -79,28 +79,37 @@ static uint64_t number_decimal (double value, int *e) {
   return m + (middle > 4 * m + 2 || (middle == 4 * m + 2 && (m & 1)));
 }
 
+/* Writes two digits. */
+static void number_pair (char *to, unsigned pair) {
+  to[0] = (char)('0' + pair / 10), to[1] = (char)('0' + pair % 10);
+}
+
 /* Prints a finite value as "%.17g" does, but with the fewest digits that read back as the same number. */
 static void number_shortest (char *to, double value) {
-  char reversed[20];
-  int e = 0, count = 0, zeros;
+  char text[20], *digit = text + sizeof text; /* the first digit */
+  int e = 0;
   if (signbit (value)) *to++ = '-';
   uint64_t m = value != 0 ? number_decimal (fabs (value), &e) : 0;
   for (; m > 0 && m % 10 == 0; m /= 10) e++;
-  do reversed[count++] = (char)('0' + m % 10);
-  while ((m /= 10) > 0);
-  int power = e + count - 1; /* of ten, of the first digit */
+  for (; m >= 100; m /= 100) number_pair (digit -= 2, (unsigned)(m % 100));
+  number_pair (digit -= 2, (unsigned)m);
+  digit += m < 10;
+  const int count = (int)(text + sizeof text - digit), power = e + count - 1; /* of ten, of the first digit */
   const int scientific = power < -4 || power >= 17, before = scientific ? 1 : power + 1;
-  if (before <= 0) *to++ = '0', *to++ = '.';
-  for (zeros = before; zeros < 0; zeros++) *to++ = '0';
-  for (int i = 0; i < count; i++) {
-    if (i == before && i > 0) *to++ = '.';
-    *to++ = reversed[count - 1 - i];
+  const size_t whole = before <= 0 ? 0 : (size_t)(before < count ? before : count), rest = (size_t)count - whole;
+  memcpy (to, digit, whole), to += whole;
+  if (before <= 0) *to++ = '0';
+  if (rest > 0) *to++ = '.';
+  for (int zeros = before < 0 ? -before : 0; zeros > 0; zeros--) *to++ = '0';
+  memcpy (to, digit + whole, rest), to += rest;
+  for (int zeros = before - count; zeros > 0; zeros--) *to++ = '0';
+  if (scientific) {
+    *to++ = 'e', *to++ = power < 0 ? '-' : '+';
+    if (abs (power) >= 100) *to++ = (char)('0' + abs (power) / 100);
+    number_pair (to, (unsigned)(abs (power) % 100));
+    to += 2;
   }
-  for (zeros = before - count; zeros > 0; zeros--) *to++ = '0';
-  if (scientific)
-    sprintf (to, "e%+03d", power);
-  else
-    *to = 0;
+  *to = 0;
 }
 
 char *pw_format (char buffer[32], double value, int digits) {
