@@ -289,10 +289,6 @@ static inline void pw_count_step (pw_run *r, int whole, double t1) {
   r->counter.count++;
   if (!whole) r->counter = (pw_step_counter){ .base = t1 };
 }
-static inline void pw_serialise_counter (pw_run *r, pw_archive *a) {
-  pw_archive_bytes (a, &r->counter.base, sizeof r->counter.base);
-  pw_archive_count (a, &r->counter.count);
-}
 
 /* 1 if the run's stabilisation is of this kind. */
 static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind) {

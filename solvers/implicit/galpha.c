@@ -141,7 +141,7 @@ static int galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20; /* iterations */
   pw_method_data *d = r->data;
   double before = INFINITY, size, round_off, target = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
-  if (h != d->common.h)
+  if (h != d->common.last.h)
     pw_implicit_scale (&d->common.dae, galpha_c (d, h), galpha_e (d, h), d->row_factor, d->column_factor);
   galpha_predict (r, h);
   for (int i = 0, refactor = 1; i < most; i++) {
@@ -167,10 +167,10 @@ static int galpha_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
-  d->common.memory = PW_ALLOC_ARRAYS (PW_ARRAY (d->v, n), PW_ARRAY (d->a, n), PW_ARRAY (d->row_factor, most),
-                                      PW_ARRAY (d->column_factor, most), PW_ARRAY (d->w, n), PW_ARRAY (d->a1, n),
-                                      PW_ARRAY (d->w1, n), PW_ARRAY (d->y, most), PW_ARRAY (d->z, most));
-  int status = pw_implicit_open (&d->common, r);
+  d->common.last.arrays = PW_ALLOC_ARRAYS (PW_ARRAY (d->v, n), PW_ARRAY (d->a, n), PW_ARRAY (d->row_factor, most),
+                                           PW_ARRAY (d->column_factor, most), PW_ARRAY (d->w, n), PW_ARRAY (d->a1, n),
+                                           PW_ARRAY (d->w1, n), PW_ARRAY (d->y, most), PW_ARRAY (d->z, most));
+  int status = d->common.last.arrays ? pw_dae_open (&d->common.dae, r) : PW_RESOURCE;
   pw_dae *x = &d->common.dae;
   if (status == PW_OK) {
     const double rho = pw_run_option (r, "rho"); /* order 2, least damping of low frequencies (Chung & Hulbert 1993) */
@@ -247,7 +247,7 @@ static int galpha_begin (pw_run *r, double h) {
 }
 
 static int galpha_step (pw_run *r, double h, double t1) {
-  int status = h != r->data->common.h ? galpha_begin (r, h) : PW_OK;
+  int status = h != r->data->common.last.h ? galpha_begin (r, h) : PW_OK;
   return status == PW_OK ? galpha_solve (r, h, t1) : status;
 }
 
@@ -289,5 +289,7 @@ const pw_method pw_method_galpha = {
   .options = galpha_options,
   .open = galpha_open,
   .advance = galpha_advance,
-  PW_IMPLICIT_FUNCTIONS,
+  .at = pw_step_at,
+  .restart = pw_step_restart,
+  .close = pw_implicit_close,
 };

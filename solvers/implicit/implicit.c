@@ -2,35 +2,19 @@
 #include <stdlib.h>
 #include "implicit.h"
 
-int pw_implicit_open (pw_implicit *x, pw_run *r) {
-  return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
-}
-
 int pw_implicit_complete (pw_run *r, int status, int size, pw_dense_projection projection, pw_error *error) {
   pw_implicit *x = (pw_implicit *)r->data;
   const pw_scatter_map *pattern = &x->dae.tangent.scatter;
   if (status == PW_OK) status = pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, pattern->colptr, pattern->rowind);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  status = pw_dense_output_open (&x->last, r, projection, error);
-  return status == PW_OK ? pw_implicit_restart (r, error) : status;
+  return pw_dense_output_open (r, projection, error);
 }
 
 void pw_implicit_close (pw_run *r) {
   pw_implicit *x = (pw_implicit *)r->data;
-  pw_dense_output_close (&x->last);
   pw_sparse_close (&x->sparse);
   pw_dae_close (&x->dae);
-  free (x->memory);
-  free (r->data);
-}
-
-int pw_implicit_restart (pw_run *r, pw_error *error) {
-  pw_implicit *x = (pw_implicit *)r->data;
-  (void)error;
-  r->counter = (pw_step_counter){ .base = r->t };
-  x->last.start.t = r->t;
-  x->h = 0;
-  return PW_OK;
+  pw_step_close (r);
 }
 
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor) {
@@ -88,7 +72,7 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   size_t n = (size_t)r->s->coords * sizeof (double);
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
-  x->h = status == PW_OK ? h : 0;
+  x->last.h = status == PW_OK ? h : 0;
   if (status != PW_OK) return status == PW_STOPPED ? status : pw_implicit_fail (r, status, h, error);
   pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
@@ -99,8 +83,4 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   r->statistics.steps++;
   pw_count_step (r, whole, t1);
   return PW_OK;
-}
-
-int pw_implicit_at (pw_run *r, double t, pw_error *error) {
-  return pw_dense_output_at (&((pw_implicit *)r->data)->last, r, t, error);
 }

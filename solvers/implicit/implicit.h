@@ -12,16 +12,11 @@ typedef enum { PW_ITERATE, PW_CONVERGED, PW_DIVERGED } pw_convergence;
 
 /* The data of each of these methods begin with this. */
 typedef struct {
-  double h;             /* size of the last step; 0: there is none, or it failed */
-  double *q1, *v1;      /* coords: the new state */
-  pw_dae dae;           /* the equations and the Newton matrix; leapfrog uses only its tangent */
-  pw_sparse sparse;     /* factors of the matrix */
-  pw_dense_output last; /* of the last step */
-  char *memory;         /* of the method's arrays */
+  pw_dense_output last;
+  double *q1, *v1;  /* coords: the new state */
+  pw_dae dae;       /* the equations and the Newton matrix; leapfrog uses only its tangent */
+  pw_sparse sparse; /* factors of the matrix */
 } pw_implicit;
-
-/* Opens x->dae, after the method has allocated its arrays, x->memory: PW_OK or PW_RESOURCE. */
-int pw_implicit_open (pw_implicit *x, pw_run *r);
 
 /* Completes the opening with the Newton matrix of this size, of the pattern in x->dae.tangent.scatter, and a dense
  * output of this projection; if `status`, of the functions before, is not PW_OK, reports that memory is exhausted. */
@@ -44,10 +39,6 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
  * error is too large.  The reason may be a singular configuration at its beginning or, in leapfrog, at its end. */
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error);
 
-/* For the table of the method: PW_IMPLICIT_FUNCTIONS. */
-int pw_implicit_at (pw_run *r, double t, pw_error *error);
-int pw_implicit_restart (pw_run *r, pw_error *error);
-void pw_implicit_close (pw_run *r);
-#define PW_IMPLICIT_FUNCTIONS .at = pw_implicit_at, .restart = pw_implicit_restart, .close = pw_implicit_close
+void pw_implicit_close (pw_run *r); /* of the method */
 
 #endif

@@ -242,11 +242,11 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
-  d->common.memory =
+  d->common.last.arrays =
       PW_ALLOC_ARRAYS (PW_ARRAY (d->u, n), PW_ARRAY (d->common.q1, n), PW_ARRAY (d->common.v1, n),
                        PW_ARRAY (d->middle, n), PW_ARRAY (d->dv, n), PW_ARRAY (d->f, n), PW_ARRAY (d->residual, rows),
                        PW_ARRAY (d->mu, rows), PW_ARRAY (d->eta, rows), PW_ARRAY (d->z, n + rows));
-  int status = pw_implicit_open (&d->common, r);
+  int status = d->common.last.arrays ? pw_dae_open (&d->common.dae, r) : PW_RESOURCE;
   pw_tangent *x = &d->common.dae.tangent;
   const int size = r->s->coords + x->rows;
   if (status == PW_OK) { /* the pattern of the matrix */
@@ -285,6 +285,8 @@ const pw_method pw_method_leapfrog = {
   .options = (const pw_option[]){ { .name = NULL } },
   .open = leapfrog_open,
   .advance = leapfrog_advance,
-  PW_IMPLICIT_FUNCTIONS,
-  .serialise = pw_serialise_counter,
+  .at = pw_step_at,
+  .restart = pw_step_restart,
+  .close = pw_implicit_close,
+  .serialise = pw_step_serialise,
 };

@@ -664,8 +664,8 @@ static void radau_fill_sample (pw_run *r, double x) {
 
 /* Projects the sample onto the constraints that the steps satisfy, in index3 onto g = 0 only, and computes
  * accelerations and multipliers from it. */
-static int radau_interpolate (void *method, pw_run *r, double t) {
-  pw_method_data *d = method;
+static int radau_interpolate (pw_run *r, double t) {
+  pw_method_data *d = r->data;
   int status;
   radau_fill_sample (r, (t - d->last.t) / d->last.h);
   if (d->dae.mu_count > 0 || !d->dae.enforces_velocities)
@@ -680,7 +680,7 @@ static int radau_interpolate (void *method, pw_run *r, double t) {
 
 static int radau_at (pw_run *r, double t, pw_error *error) {
   pw_method_data *d = r->data;
-  return pw_sample_last_step (r, d->last.t, t, radau_interpolate, d, error);
+  return pw_sample_last_step (r, d->last.t, t, radau_interpolate, error);
 }
 
 static const pw_stabilisation radau_stabilisations[] = {

@@ -34,33 +34,17 @@ struct pw_method_data {
   double *q, *v, *a, *lambda; /* coords + 3; the same; the same; rows */
   double *f, *da, *mu;        /* coords + 3: forces; correction of a; rows: of lambda */
   double *rate;               /* entries: powers in the middle of the step */
-  char *memory;
 };
-
-static int moreau_restart (pw_run *r, pw_error *error) {
-  (void)error;
-  r->counter = (pw_step_counter){ .base = r->t };
-  r->data->last.start.t = r->t;
-  return PW_OK;
-}
 
 static int moreau_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   const size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
-  d->memory =
+  d->last.arrays =
       PW_ALLOC_ARRAYS (PW_ARRAY (d->rate, r->entries), PW_ARRAY (d->q, n), PW_ARRAY (d->v, n), PW_ARRAY (d->a, n),
                        PW_ARRAY (d->f, n), PW_ARRAY (d->da, n), PW_ARRAY (d->lambda, rows), PW_ARRAY (d->mu, rows));
-  if (d->memory == NULL) return pw_fail_memory (r->s, error);
   int status = pw_impulses_open (r, error);
-  if (status == PW_OK) status = pw_dense_output_open (&d->last, r, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
-  return status == PW_OK ? moreau_restart (r, error) : status;
-}
-
-static void moreau_close (pw_run *r) {
-  pw_dense_output_close (&r->data->last);
-  free (r->data->memory);
-  free (r->data);
+  return status == PW_OK ? pw_dense_output_open (r, PW_DENSE_POSITIONS_AND_VELOCITIES, error) : status;
 }
 
 /* q = q + h/2 (v + d->v) from the state reached. */
@@ -181,8 +165,8 @@ static int moreau_advance (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
-static int moreau_interpolate (void *data, pw_run *r, double t) {
-  pw_method_data *d = data;
+static int moreau_interpolate (pw_run *r, double t) {
+  pw_method_data *d = r->data;
   const pw_step_start *start = &d->last.start;
   const double *q0 = start->q, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
   const double h = r->t - start->t, x = (t - start->t) / h;
@@ -200,7 +184,7 @@ static int moreau_interpolate (void *data, pw_run *r, double t) {
 }
 
 static int moreau_at (pw_run *r, double t, pw_error *error) {
-  return pw_sample_last_step (r, r->data->last.start.t, t, moreau_interpolate, r->data, error);
+  return pw_sample_last_step (r, r->data->last.start.t, t, moreau_interpolate, error);
 }
 
 const pw_method pw_method_moreau = {
@@ -218,7 +202,7 @@ const pw_method pw_method_moreau = {
   .open = moreau_open,
   .advance = moreau_advance,
   .at = moreau_at,
-  .restart = moreau_restart,
-  .close = moreau_close,
-  .serialise = pw_serialise_counter,
+  .restart = pw_step_restart,
+  .close = pw_step_close,
+  .serialise = pw_step_serialise,
 };

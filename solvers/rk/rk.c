@@ -920,7 +920,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
 
 void pw_rk_serialise (pw_run *r, pw_archive *a) {
   pw_method_data *d = r->data;
-  pw_serialise_counter (r, a);
+  pw_step_serialise (r, a);
   pw_archive_bytes (a, &d->off_grid, sizeof d->off_grid);
   pw_archive_bytes (a, &d->h, sizeof d->h);
   pw_archive_bytes (a, &d->last_error, sizeof d->last_error);

@@ -12,7 +12,6 @@ struct pw_method_data {
   double *a, *lambda; /* of the new state */
   size_t length;      /* of each of the method's arrays */
   double *array;      /* all of them, one after the other */
-  char *memory;
 };
 
 pw_reached pw_run_state (const pw_run *r) {
@@ -24,10 +23,11 @@ double pw_stage_time (const pw_run *r, double t) {
 }
 
 int pw_step_restart (pw_run *r, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_dense_output *b = (pw_dense_output *)r->data;
   (void)error;
   r->counter = (pw_step_counter){ .base = r->t };
-  d->last.start.t = r->t;
+  b->start.t = r->t;
+  b->h = 0;
   return PW_OK;
 }
 
@@ -37,23 +37,23 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
   d->length = n > rows ? n : rows;
-  d->memory =
+  d->last.arrays =
       PW_ALLOC_ARRAYS (PW_ARRAY (d->a, n), PW_ARRAY (d->lambda, rows), PW_ARRAY (d->array, (size_t)arrays * d->length));
-  if (d->memory == NULL) return pw_fail_memory (r->s, error);
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  pw_dense_projection projection = d->projects ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_UNPROJECTED;
-  int status = pw_dense_output_open (&d->last, r, projection, error);
-  return status == PW_OK ? pw_step_restart (r, error) : status;
+  return pw_dense_output_open (r, d->projects ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_UNPROJECTED, error);
 }
 
 void pw_step_close (pw_run *r) {
-  pw_dense_output_close (&r->data->last);
-  free (r->data->memory);
-  free (r->data);
+  pw_dense_output *b = (pw_dense_output *)r->data;
+  pw_projector_close (&b->projector);
+  free (b->memory);
+  free (b->arrays);
+  free (b);
 }
 
 void pw_step_serialise (pw_run *r, pw_archive *a) {
-  pw_serialise_counter (r, a);
+  pw_archive_bytes (a, &r->counter.base, sizeof r->counter.base);
+  pw_archive_count (a, &r->counter.count);
 }
 
 double *pw_step_array (pw_run *r, int i) {
@@ -103,26 +103,19 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   return PW_OK;
 }
 
-int pw_step_at (pw_run *r, double t, pw_error *error) {
-  return pw_dense_output_at (&r->data->last, r, t, error);
-}
-
 /* Dense output: positions and velocities by cubic Hermite interpolation, of order 4, projected onto the constraints as
  * pw_dense_projection says; accelerations, multipliers, the ledger's rates and the energy added by projections by
  * linear interpolation, with errors of order h^2. */
 
-int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error) {
+int pw_dense_output_open (pw_run *r, pw_dense_projection projection, pw_error *error) {
+  pw_dense_output *b = (pw_dense_output *)r->data;
   size_t state = pw_state_length (r->s), entries = (size_t)r->entries;
-  *b = (pw_dense_output){ .start.t = r->t, .projection = projection };
+  b->projection = projection;
   b->memory = PW_ALLOC_ARRAYS (PW_ARRAY (b->start.q, state), PW_ARRAY (b->start.ledger, entries),
                                PW_ARRAY (b->start.rate, entries));
-  if (b->memory == NULL) return pw_fail_memory (r->s, error);
-  return projection == PW_DENSE_UNPROJECTED ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
-}
-
-void pw_dense_output_close (pw_dense_output *b) {
-  pw_projector_close (&b->projector);
-  free (b->memory);
+  if (b->memory == NULL || b->arrays == NULL) return pw_fail_memory (r->s, error);
+  int status = projection == PW_DENSE_UNPROJECTED ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
+  return status == PW_OK ? pw_step_restart (r, error) : status;
 }
 
 void pw_store_start (pw_step_start *x, const pw_run *r) {
@@ -145,8 +138,8 @@ static double dense_hermite (double x, double h, double y0, double dy0, double y
   return y0 + blend * (y1 - y0) + h * x * (1 - x) * ((1 - x) * dy0 - x * dy1);
 }
 
-static int dense_interpolate (void *dense_output, pw_run *r, double t) {
-  pw_dense_output *b = dense_output;
+static int dense_interpolate (pw_run *r, double t) {
+  pw_dense_output *b = (pw_dense_output *)r->data;
   const pw_step_start *start = &b->start;
   const pw_system *s = r->s;
   const double *q0 = start->q, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
@@ -166,8 +159,8 @@ static int dense_interpolate (void *dense_output, pw_run *r, double t) {
   return pw_project_velocities (&b->projector, r, r->v_at);
 }
 
-int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error) {
-  return pw_sample_last_step (r, b->start.t, t, dense_interpolate, b, error);
+int pw_step_at (pw_run *r, double t, pw_error *error) {
+  return pw_sample_last_step (r, ((pw_dense_output *)r->data)->start.t, t, dense_interpolate, error);
 }
 
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
@@ -176,7 +169,7 @@ int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
   return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, t0, r->t);
 }
 
-int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpolate, void *method, pw_error *error) {
+int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpolate, pw_error *error) {
   if (t > r->t || t < t0) return pw_fail_outside (r, t0, t, error);
   if (t == r->t) {
     pw_sample_reached (r);
@@ -184,7 +177,7 @@ int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpo
   }
   const pw_statistics statistics = r->statistics;
   r->projected_at = r->projected;
-  int status = interpolate (method, r, t);
+  int status = interpolate (r, t);
   r->statistics = statistics;
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail_signal (t, error);

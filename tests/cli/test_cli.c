@@ -241,6 +241,7 @@ TEST (reaction_columns) {
 TEST (ledger_columns) {
   const char *csv = cli_columns ("-m rk4+projection --step 0.05 -t 0.3 --every 0.1");
   double start = cli_cell (csv, 0, "kinetic [J]") + cli_cell (csv, 0, "potential [J]");
+  assert_non_null (strstr (csv, ",kinetic [J],potential [J],"));
   for (int row = 1; row < 4; row++) {
     double energy = cli_cell (csv, row, "kinetic [J]") + cli_cell (csv, row, "potential [J]") - start;
     double work = cli_cell (csv, row, "W.work [J]") + cli_cell (csv, row, "twist.work [J]");
