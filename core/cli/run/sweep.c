@@ -45,7 +45,7 @@ typedef struct {
   int with_error;  /* 1: columns with the stated errors of states */
   const char **of; /* --of: outputs, ended by NULL; NULL: none */
   int outputs;     /* their number */
-  double *drawn;   /* rows x outputs, or states if there are none: set by table_finish; NULL: not wanted */
+  double *drawn;   /* rows x outputs, or states if there are none: set by plan_keep_drawn; NULL: not wanted */
   int part, parts; /* --part; 1, 1 if it is not given */
   pw_specialise specialise;
   int lanes; /* --lanes, runs that a thread advances at once by vector instructions; 0: not given */
@@ -402,6 +402,35 @@ static void plan_close (pw_plan *plan) {
   free (plan->column);
 }
 
+/* The number of columns that are drawn: outputs; without any, the first states. */
+enum { PW_PLAN_DRAWN = 12 };
+static int plan_drawn (const pw_plan *plan) {
+  return plan->outputs ? plan->outputs : plan->columns < PW_PLAN_DRAWN ? plan->columns : PW_PLAN_DRAWN;
+}
+
+/* The cell of a row, see plan_cells, that contains what is drawn as number i. */
+static int plan_drawn_cell (const pw_plan *plan, int i) {
+  const int states = plan->grid.axes + 2;
+  int cell = states + plan->columns * (1 + plan->with_error);
+  if (plan->outputs == 0) return states + i;
+  for (int k = 0; k < (plan->output[i].is_known ? plan->outputs : i); k++) cell += !plan->output[k].is_known;
+  if (!plan->output[i].is_known || strcmp (plan->output[i].name, "kinetic") == 0) return cell;
+  const int state = pw_names_find (&plan->column_of, plan->output[i].name);
+  return state < 0 ? states - 1 /* t */ : states + state;
+}
+
+/* Keeps the numbers of a row that are drawn. */
+static void plan_keep_drawn (void *context, long row, const char *line) {
+  const pw_plan *plan = context;
+  const int count = plan_drawn (plan);
+  for (int i = 0; i < count; i++) {
+    const char *cell = line;
+    double *value = &plan->drawn[row * count + i];
+    for (int k = plan_drawn_cell (plan, i); k > 0; k--) cell += strcspn (cell, ",") + 1;
+    if (pw_read_number (PW_PART (cell, strcspn (cell, ",")), value) != PW_OK) *value = NAN;
+  }
+}
+
 /* Journals and parts of a sweep, and the table made of them.
  *
  * A journal has rows in the order of completion, each appended by one write.  If the program is killed, the fingerprint
@@ -421,14 +450,19 @@ static void plan_close (pw_plan *plan) {
 /* The rows done, in the order of completion, in a file next to the table, from which a sweep that was stopped
  * continues. */
 typedef struct {
-  char *table_path; /* links followed */
-  char *path;       /* of the journal: that of the table and ".part" */
-  int descriptor;   /* of the journal, locked; -1: not open */
-  int begun;        /* 1: this process has written the fingerprint, in a new file or where it was incomplete */
-  off_t *offset;    /* in the journal, of the line of row r of the part: offset[r / parts]; 0: missing */
-  long rows, done;  /* numbers of these rows; of those in the journal */
-  off_t size;       /* bytes of the journal's complete lines */
+  int part, parts;              /* part I of N */
+  const pw_stream *fingerprint; /* its first lines */
+  char *table_path;             /* links followed */
+  char *path;                   /* of the journal: that of the table and ".part" */
+  int descriptor;               /* of the journal, locked; -1: not open */
+  int begun;       /* 1: this process has written the fingerprint, in a new file or where it was incomplete */
+  off_t *offset;   /* in the journal, of the line of row r of the part: offset[r / parts]; 0: missing */
+  long rows, done; /* numbers of these rows; of those in the journal */
+  off_t size;      /* bytes of the journal's complete lines */
 } pw_journal;
+
+/* Called with a row of the part, from 0, and its line of the table. */
+typedef void pw_journal_visit (void *context, long row, const char *line);
 
 /* How the runs of a table ended. */
 typedef struct {
@@ -459,12 +493,13 @@ static unsigned long journal_checksum (long row, int status, const char *text, s
 /* Reads the line that begins here; 0 if it is incomplete or damaged. */
 static int journal_line_read (const char *begin, const char *end, journal_line *line) {
   const char *newline = begin < end ? memchr (begin, '\n', (size_t)(end - begin)) : NULL;
-  char front[40]; /* up to the line of the table */
-  int n = 0;
+  int n = 0; /* bytes up to the line of the table */
   unsigned long checksum;
   if (newline == NULL) return 0;
-  snprintf (front, sizeof front, "%.*s", (int)(newline - begin < 39 ? newline - begin : 39), begin);
-  if (sscanf (front, "%10ld %1d %8lx %n", &line->row, &line->status, &checksum, &n) != 3 || n == 0) return 0;
+  if (sscanf (PW_PART (begin, (size_t)(newline - begin)), "%10ld %1d %8lx %n", &line->row, &line->status, &checksum,
+              &n) != 3 ||
+      n == 0)
+    return 0;
   line->text = begin + n;
   line->text_size = (size_t)(newline + 1 - line->text);
   line->line_size = (size_t)(newline + 1 - begin);
@@ -508,10 +543,10 @@ static int journal_write (pw_journal *journal, const char *text, size_t size, pw
 }
 
 /* Verifies that the journal is one of this sweep, and reads its rows; journal->size is where the next row goes. */
-static int journal_read (pw_journal *journal, const pw_plan *plan, const journal_map *map, pw_error *error) {
+static int journal_read (pw_journal *journal, const journal_map *map, pw_error *error) {
   char difference[400];
   size_t size = (size_t)(map->end - map->begin), magic_size = strlen (PW_SWEEP_MAGIC);
-  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.text;
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *own = journal->fingerprint->text;
   journal->size = 0;
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->begin, PW_SWEEP_MAGIC, size < magic_size ? size : magic_size) == 0) return PW_OK;
@@ -519,15 +554,15 @@ static int journal_read (pw_journal *journal, const pw_plan *plan, const journal
                     journal->path);
   }
   const pw_fingerprint there = { map->begin, rows, "there" };
-  const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.size, "here" };
+  const pw_fingerprint here = { own, own + journal->fingerprint->size, "here" };
   if (pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
                     journal->path, difference);
   journal_line line; /* until one that is incomplete, damaged, a duplicate or of another part */
   for (; journal_line_read (rows, map->end, &line); rows += line.line_size) {
-    long k = line.row / plan->parts;
-    if (line.row % plan->parts != plan->part - 1 || k >= journal->rows || journal->offset[k] != 0) break;
+    long k = line.row / journal->parts;
+    if (line.row % journal->parts != journal->part - 1 || k >= journal->rows || journal->offset[k] != 0) break;
     journal->offset[k] = (off_t)(rows - map->begin);
     journal->done++;
   }
@@ -535,26 +570,31 @@ static int journal_read (pw_journal *journal, const pw_plan *plan, const journal
   return PW_OK;
 }
 
-static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *error) {
+static int journal_begin (pw_journal *journal, pw_error *error) {
   journal_map map;
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
-  int status = journal_read (journal, plan, &map, error);
+  int status = journal_read (journal, &map, error);
   off_t file_size = (off_t)(map.end - map.begin);
   journal_map_close (&map);
   if (status != PW_OK) return status;
   if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->path, strerror (errno));
   journal->begun = journal->size == 0;
-  return journal->begun ? journal_write (journal, plan->fingerprint.text, plan->fingerprint.size, error) : PW_OK;
+  if (!journal->begun) return PW_OK;
+  return journal_write (journal, journal->fingerprint->text, journal->fingerprint->size, error);
 }
 
-/* Opens the journal of the table at `path`, or creates it.  It is truncated at the first line that is incomplete,
+/* Opens the journal of a part of the table at `path`, or creates it; rows: of the table.  It is truncated at the first line that is incomplete,
  * damaged, repeated or of another part.  Close it in every case.  PW_RESOURCE if it cannot be written or another
  * process has it, PW_INPUT if it belongs to another sweep. */
-static int journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error) {
-  long rows = plan->grid.rows / plan->parts + (plan->grid.rows % plan->parts >= plan->part);
-  *journal = (pw_journal){ .descriptor = -1, .rows = rows };
+static int journal_open (pw_journal *journal, const char *path, long rows, int part, int parts,
+                         const pw_stream *fingerprint, pw_error *error) {
+  *journal = (pw_journal){ .part = part,
+                           .parts = parts,
+                           .fingerprint = fingerprint,
+                           .descriptor = -1,
+                           .rows = rows / parts + (rows % parts >= part) };
   journal->table_path = pw_output_path (path, error);
   if (journal->table_path == NULL) return error->status;
   if (asprintf (&journal->path, "%s.part", journal->table_path) < 0) journal->path = NULL;
@@ -562,13 +602,12 @@ static int journal_open (pw_journal *journal, const pw_plan *plan, const char *p
   if (journal->path == NULL || journal->offset == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", journal->rows);
   journal->descriptor = pw_lock_path (journal->path, error);
-  return journal->descriptor >= 0 ? journal_begin (journal, plan, error) : error->status;
+  return journal->descriptor >= 0 ? journal_begin (journal, error) : error->status;
 }
 
 /* Appends a row of the grid: the exit status of its run, 0 to 4, and its line of the table, `text`, without a newline.
  * One thread at a time.  PW_RESOURCE: the journal is unchanged. */
-static int journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text,
-                        pw_error *error) {
+static int journal_add (pw_journal *journal, long row, int status, const char *text, pw_error *error) {
   const off_t at = journal->size;
   char *line;
   const int size =
@@ -577,9 +616,14 @@ static int journal_add (pw_journal *journal, const pw_plan *plan, long row, int 
   status = journal_write (journal, line, (size_t)size, error);
   free (line);
   if (status != PW_OK) return status;
-  journal->offset[row / plan->parts] = at;
+  journal->offset[row / journal->parts] = at;
   journal->done++;
   return PW_OK;
+}
+
+/* 1 if a row of the grid belongs to the part and is missing. */
+static int journal_lacks (const pw_journal *journal, long row) {
+  return row % journal->parts == journal->part - 1 && journal->offset[row / journal->parts] == 0;
 }
 
 /* Removes the journal if it was begun here and has no rows. */
@@ -617,38 +661,13 @@ static int table_close (pw_output *output, pw_error *error) {
   return error->status;
 }
 
-/* The number of columns that are drawn: outputs; without any, the first states. */
-enum { PW_PLAN_DRAWN = 12 };
-static int plan_drawn (const pw_plan *plan) {
-  return plan->outputs ? plan->outputs : plan->columns < PW_PLAN_DRAWN ? plan->columns : PW_PLAN_DRAWN;
-}
-
-/* The cell of a row, see plan_cells, that contains what is drawn as number i. */
-static int table_cell_of (const pw_plan *plan, int i) {
-  const int states = plan->grid.axes + 2;
-  int cell = states + plan->columns * (1 + plan->with_error);
-  if (plan->outputs == 0) return states + i;
-  for (int k = 0; k < (plan->output[i].is_known ? plan->outputs : i); k++) cell += !plan->output[k].is_known;
-  if (!plan->output[i].is_known || strcmp (plan->output[i].name, "kinetic") == 0) return cell;
-  const int state = pw_names_find (&plan->column_of, plan->output[i].name);
-  return state < 0 ? states - 1 /* t */ : states + state;
-}
-
-static void table_keep (const pw_plan *plan, long row, const char *line) {
-  const int count = plan_drawn (plan);
-  for (int i = 0; i < count; i++) {
-    const char *cell = line;
-    double *value = &plan->drawn[row * count + i];
-    for (int k = table_cell_of (plan, i); k > 0; k--) cell += strcspn (cell, ",") + 1;
-    if (pw_read_number (PW_PART (cell, strcspn (cell, ",")), value) != PW_OK) *value = NAN;
-  }
-}
-
 /* What table_write needs. */
 typedef struct {
   const pw_journal *journal;
-  const pw_plan *plan;
   const journal_map *map;
+  const pw_stream *heading;
+  pw_journal_visit *visit;
+  void *context;
   pw_tally *tally;
   pw_error *error; /* if the journal was changed */
 } table_source;
@@ -656,30 +675,32 @@ typedef struct {
 static void table_write (const void *context, pw_cells *cells) {
   const table_source *x = context;
   FILE *f = cells->f;
-  const pw_plan *plan = x->plan;
-  const int is_part = plan->parts > 1;
-  fprintf (f, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.text : plan->heading.text);
-  for (long k = 0; k < x->journal->rows; k++) {
-    const char *at = x->map->begin + x->journal->offset[k];
+  const pw_journal *journal = x->journal;
+  const int is_part = journal->parts > 1;
+  fprintf (f, is_part ? "%s" : "%s\n", is_part ? journal->fingerprint->text : x->heading->text);
+  for (long k = 0; k < journal->rows; k++) {
+    const char *at = x->map->begin + journal->offset[k];
     journal_line line;
-    if (!table_read_row (at, x->map->end, plan->part - 1 + k * plan->parts, &line, x->tally)) {
-      pw_fail (x->error, PW_RESOURCE, "%s was changed by another program", x->journal->path);
+    if (!table_read_row (at, x->map->end, journal->part - 1 + k * journal->parts, &line, x->tally)) {
+      pw_fail (x->error, PW_RESOURCE, "%s was changed by another program", journal->path);
       return;
     }
     fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, f);
-    if (plan->drawn) table_keep (plan, k, line.text);
+    if (x->visit) x->visit (x->context, k, line.text);
   }
 }
 
-/* Writes the table of a complete journal, or its part, and removes the journal. */
-static int table_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
+/* Writes the table of a complete journal, or its part, and removes the journal.  visit: called with the line of each
+ * row; NULL: nothing. */
+static int table_finish (pw_journal *journal, const pw_stream *heading, pw_journal_visit *visit, void *context,
+                         pw_tally *tally, pw_error *error) {
   journal_map map;
   pw_error failure = { 0 };
   *tally = (pw_tally){ .rows = 0 };
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
-  const table_source source = { journal, plan, &map, tally, &failure };
+  const table_source source = { journal, &map, heading, visit, context, tally, &failure };
   if (output) pw_cli_write_table (journal->table_path, pw_output_stream (output), &source, table_write, &failure);
   if (output) table_close (output, &failure);
   journal_map_close (&map);
@@ -700,8 +721,7 @@ typedef struct {
 
 static int table_open_part (table_part *part, const char *path, pw_error *error) {
   const char *reason;
-  char text[40] = "";
-  size_t size;
+  size_t size = 0;
   FILE *f = pw_open_input (path, &reason);
   part->path = path;
   if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the part %s: %s", path, reason);
@@ -710,9 +730,8 @@ static int table_open_part (table_part *part, const char *path, pw_error *error)
   if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "cannot read the part %s: %s", path, strerror (why));
   part->first_row = part->next_row = pw_fingerprint_end (PW_SWEEP_MAGIC, part->map.begin, part->map.end);
   const char *value = part->first_row ? pw_fingerprint_value (part->map.begin, part->first_row, "part", &size) : NULL;
-  if (value) snprintf (text, sizeof text, "%.*s", (int)(size < 39 ? size : 39), value); /* sscanf needs its end */
-  if (sscanf (text, "%9d/%9d", &part->number, &part->parts) != 2 || part->parts < 1 || part->number < 1 ||
-      part->number > part->parts)
+  if (sscanf (PW_PART (value ? value : "", size), "%9d/%9d", &part->number, &part->parts) != 2 || part->parts < 1 ||
+      part->number < 1 || part->number > part->parts)
     return pw_fail (error, PW_INPUT, "%s is not a part of a sweep: parts are written by --part I/N", path);
   return PW_OK;
 }
@@ -1005,7 +1024,7 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (status == PW_RETRY || sweep->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
     pw_fail (sweep->error, PW_RESOURCE, "row %ld of the grid: %s", row->number + 1, row->error.text);
-  else if (journal_add (sweep->journal, sweep->plan, row->number, -status, text, sweep->error) == PW_OK)
+  else if (journal_add (sweep->journal, row->number, -status, text, sweep->error) == PW_OK)
     pw_progress_at (&sweep->progress, (double)sweep->journal->done);
   if (sweep->error->status != PW_OK) pw_stop = 1;
 }
@@ -1027,7 +1046,7 @@ static int worker_begin (sweep_rows *sweep, sweep_row *row) {
   long number = -1; /* of the next missing row of the part; none after a request to stop */
   while (number < 0 && pw_stop == 0 && sweep->next < plan->grid.rows) {
     long next = grid_scheduled_row (&plan->grid, sweep->next++);
-    if (next % plan->parts == plan->part - 1 && sweep->journal->offset[next / plan->parts] == 0) number = next;
+    if (journal_lacks (sweep->journal, next)) number = next;
   }
   if (number < 0) return 0;
   *row = (sweep_row){ .number = number, .system = system_of (sweep, number) };
@@ -1320,7 +1339,9 @@ static int sweep_open (pw_sweep *sweep, pw_error *error) {
   const size_t numbers = (size_t)sweep->plan.grid.rows * (size_t)plan_drawn (&sweep->plan);
   if (status == PW_OK && sweep->line.plots && (sweep->plan.drawn = malloc (numbers * sizeof (double))) == NULL)
     status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = journal_open (&sweep->journal, &sweep->plan, sweep->line.table, error);
+  if (status == PW_OK)
+    status = journal_open (&sweep->journal, sweep->line.table, sweep->plan.grid.rows, sweep->plan.part,
+                           sweep->plan.parts, &sweep->plan.fingerprint, error);
   if (status != PW_OK) return status;
   if (sweep->journal.done > 0)
     pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
@@ -1338,7 +1359,8 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
                 sweep->journal.done, sweep->journal.rows, sweep->journal.path);
     return PW_INTERRUPTED;
   }
-  int status = table_finish (&sweep->journal, &sweep->plan, &sweep->tally, error);
+  int status = table_finish (&sweep->journal, &sweep->plan.heading, sweep->plan.drawn ? plan_keep_drawn : NULL,
+                             &sweep->plan, &sweep->tally, error);
   if (status == PW_OK) status = pw_results_write (&sweep->line, &sweep_results, sweep, error);
   if (status != PW_OK) return status;
   if (sweep->plan.parts == 1) return sweep_conclude (&sweep->tally, error);
