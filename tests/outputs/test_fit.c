@@ -465,6 +465,8 @@ TEST (bad) {
   };
   cli_bad (FIT "--free k -o @/f.txt", 2,
            "-o @/f.txt: the format .txt is not written: expected a name that ends in .csv, .npz or .json");
+  cli_bad (FIT "--free k --plots @/f --width 85", 2, "--width 85: expected a length such as 85mm");
+  assert_string_equal (cli_out, ""); /* refused before the fit */
   cli_write ("two.csv", "t,w.phi\n1,0\n2,0.1\n3,nan\n");
   cli_write ("mixed.csv", "t,w.phi,w.omega\n1,0,0\n2,0.1,0\n");
   cli_write ("word.csv", "t,w.phi\n1,0\n2,many\n");
