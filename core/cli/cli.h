@@ -128,6 +128,9 @@ static inline double pw_cli_given_or (pw_cli_given x, double otherwise) {
   return x.text ? x.number : otherwise;
 }
 
+/* The value of --specialise: when code is compiled for a scene. */
+typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } pw_specialise;
+
 /* A command line: its arguments and the options shared by several commands, NULL if not given; and what most commands
  * use, released after the command.  The structure of options of every command begins with one. */
 typedef struct {
@@ -136,6 +139,7 @@ typedef struct {
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char **method_files;
   const char *method, *specialise, *width, *until;
+  pw_specialise when; /* of --specialise, read by pw_cli_file */
   pw_cli_given max_file, t_end, step, rtol, atol, max_steps, limit, jobs;
   const char *table, *json, *plots; /* -o, --json, --plots of PW_RESULTS_OPTIONS */
   int drawn;                        /* the status of figures, set before the summary is written */
@@ -329,15 +333,10 @@ const char *pw_cli_short_path (const char *path);
 
 /* ---- The engine of runs (engine.c): what evaluates the equations of motion ---- */
 
-typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } pw_specialise;
-
 typedef struct {
   pw_scene_code *code; /* NULL: the general engine */
   char reason[200];    /* why the general engine is used */
 } pw_cli_engine;
-
-/* Reads the value of --specialise; NULL, if it is not given, means "auto". */
-int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *error);
 
 /* The C text of the code specialised for a system, without the constraint equations that are redundant at the initial
  * state, if that can be made consistent.  NULL and the error if there can be none.  Free it. */

@@ -432,6 +432,17 @@ static int cli_method_files (pw_cli_line *line, pw_error *error) {
   return PW_OK;
 }
 
+static int cli_read_specialise (pw_cli_line *line, pw_error *error) {
+  static const char *const name[] = { "auto", "always", "never", NULL };
+  char hint[PW_HINT];
+  int i = line->specialise ? pw_find_name (name, sizeof *name, line->specialise, hint) : PW_SPECIALISE_AUTO;
+  if (i < 0)
+    return pw_fail (error, PW_INPUT, "--specialise \"%.60s\": expected auto, always or never%s", line->specialise,
+                    hint);
+  line->when = (pw_specialise)i;
+  return PW_OK;
+}
+
 int pw_cli_file (pw_cli_line *line, pw_error *error) {
   const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
   const double size = pw_cli_given_or (line->max_file, PW_FILE_DEFAULT_BYTES >> 20);
@@ -439,7 +450,8 @@ int pw_cli_file (pw_cli_line *line, pw_error *error) {
   if (size > largest)
     return pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file.text, largest);
   line->m.file = pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
-  if (line->m.file == NULL || cli_method_files (line, error) != PW_OK) return error->status;
+  if (line->m.file == NULL || cli_method_files (line, error) != PW_OK || cli_read_specialise (line, error) != PW_OK)
+    return error->status;
   pw_run_defaults *d = &line->m.defaults;
   *d = pw_file_table (line->m.file)->run;
   if (d->t_end == 0) d->t_end = 10;

@@ -3,15 +3,6 @@
 #include <string.h>
 #include "cli.h"
 
-int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *error) {
-  static const char *const name[] = { "auto", "always", "never", NULL };
-  char hint[PW_HINT];
-  int i = text ? pw_find_name (name, sizeof *name, text, hint) : PW_SPECIALISE_AUTO;
-  if (i < 0) return pw_fail (error, PW_INPUT, "--specialise \"%.60s\": expected auto, always or never%s", text, hint);
-  *when = (pw_specialise)i;
-  return PW_OK;
-}
-
 char *pw_cli_source (const pw_system *s, pw_error *error) {
   if (pw_system_check_source (s, error) != PW_OK) return NULL;
   pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */

@@ -694,12 +694,10 @@ static const pw_results optimise_results = {
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
-  const double starts = pw_cli_given_or (problem->starts_given, 10);
   problem->least = INFINITY, problem->seed = pw_cli_given_or (problem->seed_given, 1);
-  problem->starts = (int)starts, problem->jobs = pw_parallel_jobs (&problem->line);
+  problem->starts = (int)pw_cli_given_or (problem->starts_given, 10), problem->jobs = pw_parallel_jobs (&problem->line);
   if (!problem->maximise == !problem->minimise)
     return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
-  if (starts > 1e5) return pw_fail (error, PW_INPUT, "--starts: at most 100000");
   for (const char **given = problem->subject_to; given && *given; given++) count++;
   problem->output = pw_arena_alloc (&problem->line.arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
   problem->unit = pw_arena_alloc (&problem->line.arena, count * sizeof *problem->unit);

@@ -33,7 +33,6 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error) 
   *u = (pw_unknowns){ .line = line, .method = line->method ? line->method : line->m.defaults.method };
   int status = pw_method_parse (u->method, line->methods, &method, &stabilisation, error);
   pw_cli_settings (line, &line->m.defaults, &u->settings, &limit);
-  if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
   if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL;
@@ -43,11 +42,12 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error) 
 }
 
 int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error) {
+  if (starts > PW_UNKNOWNS_STARTS) return pw_fail (error, PW_INPUT, "--starts: at most %d", PW_UNKNOWNS_STARTS);
   if (starts > 1 && u->count > PW_UNKNOWNS_SOBOL_MOST)
     return pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
                     PW_UNKNOWNS_SOBOL_MOST);
   pw_cli_report_tables (u->line->m.system, u->settings.span);
-  pw_cli_engine_open (&u->engine, u->line->m.system, u->when,
+  pw_cli_engine_open (&u->engine, u->line->m.system, u->line->when,
                       runs * starts *
                           pw_method_steps (u->method, &u->settings, u->line->m.defaults.step, u->settings.span));
   return PW_OK;

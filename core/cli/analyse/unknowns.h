@@ -29,7 +29,6 @@ typedef struct {
   const char *method;
   pw_settings settings; /* without those that differ between runs (pw_unknown_run) */
   double limit;         /* of the processor time of each run [s] */
-  pw_specialise when;   /* of --specialise */
   pw_cli_engine engine;
 } pw_unknowns;
 
@@ -40,8 +39,9 @@ void pw_unknowns_close (pw_unknowns *u);
  * the model does not have or that is given twice, a parameter that is a count, and bounds outside its domain or without
  * its value between them. */
 int pw_unknowns_read (pw_unknowns *u, const char *option, const char **list, pw_error *error);
-/* Chooses the engine for searches from `starts` points, of about `runs` runs each.  PW_INPUT if there are too many
- * unknowns for more than one start. */
+/* Chooses the engine for searches from `starts` points, of about `runs` runs each.  PW_INPUT for too many starts, and if
+ * there are too many unknowns for more than one start. */
+enum { PW_UNKNOWNS_STARTS = 100000 };
 int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error);
 
 /* A run with given values of the unknowns. */

@@ -180,21 +180,23 @@ static plot_box box_ground (const pw_plots *plots) {
   return box;
 }
 
+/* Extends a box by points of a body at this placement. */
+static void box_extend_points (plot_box *box, const double *placement, const double (*at)[2], int count) {
+  for (int n = 0; n < count; n++) {
+    double point[2];
+    pw_plot_point (placement, at[n], point);
+    box_extend (box, point);
+  }
+}
+
 /* Extends a box by all attachment points, centres of mass and wheels of sample i; returns its diagonal [m]. */
 static double box_extend_all (plot_box *box, const pw_plots *plots, int i) {
   for (int k = 0; k < plots->bodies.drawn; k++) {
     const double *motion = pw_plot_track (plots, i, &plots->bodies, k);
+    const pw_plot_body *shape = &plots->shape[k];
     box_extend (box, motion);
-    for (int n = 0; n < plots->shape[k].attachments; n++) {
-      double point[2];
-      pw_plot_point (motion, plots->shape[k].attachment[n], point);
-      box_extend (box, point);
-    }
-    for (int n = 0; n < plots->shape[k].corners; n++) {
-      double point[2];
-      pw_plot_point (motion, plots->shape[k].corner[n], point);
-      box_extend (box, point);
-    }
+    box_extend_points (box, motion, (const double (*)[2])shape->attachment, shape->attachments);
+    box_extend_points (box, motion, shape->corner, shape->corners);
   }
   for (int w = 0; w < plots->wheels.drawn; w++) box_extend (box, pw_plot_track (plots, i, &plots->wheels, w));
   box_extend_discs (box, plots, i, 0);

@@ -733,7 +733,7 @@ static void run_discard (pw_run_cli *command, int which) {
 static int run_read_settings (pw_run_cli *command, pw_error *error) {
   const pw_run_defaults *defaults = &command->line.m.defaults;
   const pw_method *method;
-  pw_specialise when;
+  pw_specialise when = command->line.when;
   pw_error reason = { 0 };
   pw_cli_settings (&command->line, defaults, &command->settings, &command->limit);
   command->row_interval = command->every.number;
@@ -743,9 +743,7 @@ static int run_read_settings (pw_run_cli *command, pw_error *error) {
     return pw_fail (error, reason.status, "model %s: its default method: %s", pw_file_name (command->line.m.file),
                     reason.text);
   command->settings.ledger = command->with_energies || command->plots_path || command->page_path;
-  int status = pw_cli_read_specialise (command->line.specialise, &when, error);
-  if (status == PW_OK) status = checkpoints_open (command, &when, error);
-  if (status != PW_OK) return status;
+  if (checkpoints_open (command, &when, error) != PW_OK) return error->status;
   pw_cli_engine_open (&command->engine, command->line.m.system, when,
                       pw_method_steps (command->method, &command->settings, defaults->step, command->settings.span));
   command->settings.specialised = pw_scene_code_table (command->engine.code);
@@ -809,6 +807,16 @@ static double run_next_row_time (const pw_run_cli *command) {
   return t > 0 && fabs (t - command->settings.span) <= round_off ? command->settings.span : t;
 }
 
+/* Writes the row of a time in the last step. */
+static int run_write_row (pw_run_cli *command, double t, pw_error *error) {
+  pw_sample sample;
+  int status = pw_run_sample (command->run, t, &sample, error);
+  if (status == PW_OK) status = pw_csv_write (command->table, command->line.m.system, &sample, error);
+  command->rows += status == PW_OK;
+  pw_progress_at (&command->progress, t);
+  return status;
+}
+
 /* Writes rows and stores samples up to the time reached, or that at which --until ends the run, which has a row. */
 static int run_store_samples (pw_run_cli *command, pw_error *error) {
   pw_motion *motion = &command->comparison.motion;
@@ -816,20 +824,12 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   double now = run_end_time (command);
   pw_sample sample;
   int status = PW_OK;
-  while (status == PW_OK && run_next_row_time (command) <= now) {
-    status = pw_run_sample (run, command->row_interval > 0 ? run_next_row_time (command) : now, &sample, error);
-    if (status == PW_OK) status = pw_csv_write (command->table, command->line.m.system, &sample, error);
-    if (status != PW_OK) break;
-    command->rows++;
-    pw_progress_at (&command->progress, sample.t);
-    if (command->row_interval == 0) break;
-  }
+  if (command->table && command->row_interval == 0) status = run_write_row (command, now, error);
+  while (status == PW_OK && command->row_interval > 0 && run_next_row_time (command) <= now)
+    status = run_write_row (command, run_next_row_time (command), error);
   if (status == PW_OK && command->table && command->row_interval > 0 && command->outcomes.ended &&
-      (double)(command->rows - 1) * command->row_interval < now) { /* the last row is not a multiple of the interval */
-    status = pw_run_sample (run, now, &sample, error);
-    if (status == PW_OK) status = pw_csv_write (command->table, command->line.m.system, &sample, error);
-    command->rows++;
-  }
+      (double)(command->rows - 1) * command->row_interval < now) /* the last row is not a multiple of the interval */
+    status = run_write_row (command, now, error);
   while (status == PW_OK && command->plots && pw_plots_next (command->plots) <= now) {
     status = pw_run_sample (run, pw_plots_next (command->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (command->plots, &sample);

@@ -308,14 +308,12 @@ static int study_open_folder (pw_study *study, pw_error *error) {
 }
 
 static int study_open (pw_study *study, pw_error *error) {
-  pw_specialise when;
   study->run_share = 1;
   study->cpu_limit = INFINITY;
   pthread_mutex_init (&study->mutex, NULL);
   int status = pw_cli_open (&study->line, error);
   study->jobs = pw_parallel_jobs (&study->line);
   if (status == PW_OK) status = study->type->plan (study, error);
-  if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
   if (status == PW_OK) status = pw_report_initial_state (&study->line.m, study->limit.seconds, error);
   if (status != PW_OK) return status;
   pw_cli_report_tables (study->line.m.system, study->settings.span);
@@ -327,7 +325,7 @@ static int study_open (pw_study *study, pw_error *error) {
              pw_method_steps (row->method, &settings, study->line.m.defaults.step, study->settings.span);
   }
   /* one engine for all runs, since `compare` compares their processor times */
-  pw_cli_engine_open (&study->engine, study->line.m.system, when, steps);
+  pw_cli_engine_open (&study->engine, study->line.m.system, study->line.when, steps);
   return study_open_folder (study, error);
 }
 

@@ -41,8 +41,7 @@ typedef struct {
   int outputs;     /* their number */
   double *drawn;   /* rows x outputs, or states if there are none: set by plan_keep_drawn; NULL: not wanted */
   int part, parts; /* --part; 1, 1 if it is not given */
-  pw_specialise specialise;
-  int lanes; /* --lanes, runs that a thread advances at once by vector instructions; 0: not given */
+  int lanes;       /* --lanes, runs that a thread advances at once by vector instructions; 0: not given */
   /* set by plan_open */
   pw_grid grid;
   pw_cli_engine engine;      /* of the first row that can be built, so that it does not depend on the part */
@@ -250,7 +249,7 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
     double steps = (double)plan->grid.rows *
                    pw_method_steps (plan->method, &plan->settings, plan->line->m.defaults.step, plan->settings.span);
     pw_cli_report_tables (compiled.system, plan->settings.span);
-    pw_cli_engine_open (&plan->engine, compiled.system, plan->specialise, steps);
+    pw_cli_engine_open (&plan->engine, compiled.system, plan->line->when, steps);
     const char *reason = plan->with_cpu                   ? "--cpu measures each run"
                          : plan->with_error               ? "--error repeats each run"
                          : plan->by_steps                 ? "outputs and conditions follow each step"
@@ -825,7 +824,6 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
                     plan->of ? "of" : "until");
   pw_cli_settings (&sweep->line, defaults, &plan->settings, &plan->limit);
   pw_cli_report_unused (plan->method, &sweep->line);
-  if (pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error) != PW_OK) return error->status;
   plan->lanes = lanes ? *lanes - '0' : 0;
   if (lanes && (plan->lanes < 1 || plan->lanes > PW_LANES_MOST || (plan->lanes & (plan->lanes - 1)) != 0 || lanes[1]))
     return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, lanes);

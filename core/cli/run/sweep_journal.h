@@ -32,9 +32,9 @@ typedef struct {
   char reason[300];  /* from its row */
 } pw_tally;
 
-/* Opens the journal of a part of the table at `path`, or creates it; rows: of the table.  It is truncated at the first line that is incomplete,
- * damaged, repeated or of another part.  Close it in every case.  PW_RESOURCE if it cannot be written or another
- * process has it, PW_INPUT if it belongs to another sweep. */
+/* Opens the journal of a part of the table at `path`, or creates it; rows: of the table.  It is truncated at the first
+ * line that is incomplete, damaged, repeated or of another part.  Close it in every case.  PW_RESOURCE if it cannot be
+ * written or another process has it, PW_INPUT if it belongs to another sweep. */
 int pw_journal_open (pw_journal *journal, const char *path, long rows, int part, int parts,
                      const pw_stream *fingerprint, pw_error *error);
 /* Appends a row of the grid: the exit status of its run, 0 to 4, and its line of the table, `text`, without a newline.
