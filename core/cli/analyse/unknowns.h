@@ -39,8 +39,8 @@ void pw_unknowns_close (pw_unknowns *u);
  * the model does not have or that is given twice, a parameter that is a count, and bounds outside its domain or without
  * its value between them. */
 int pw_unknowns_read (pw_unknowns *u, const char *option, const char **list, pw_error *error);
-/* Chooses the engine for searches from `starts` points, of about `runs` runs each.  PW_INPUT for too many starts, and if
- * there are too many unknowns for more than one start. */
+/* Chooses the engine for searches from `starts` points, of about `runs` runs each.  PW_INPUT for too many starts, or
+ * too many unknowns for more than one. */
 enum { PW_UNKNOWNS_STARTS = 100000 };
 int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error);
 
