@@ -427,10 +427,11 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   pw_saddle_close (saddle);
   if (pw_update_velocities (r->w, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   pw_modes_end_impact (r, r->v);
-  for (int k = 0; k < x->d.n; k++) {
-    x->impulse[x->d.list[k]] -= x->d.x[k];
-    x->struck[x->d.list[k]] |= x->d.x[k] != 0;
-    x->rests[x->d.list[k]] = fabs (x->u[x->d.list[k]]) <= PW_MODES_SMALL * x->unit[x->d.list[k]];
+  for (int k = 0; k < x->d.n; k++) { /* listed if it changes u by more than what counts as 0 */
+    const int i = x->d.list[k];
+    if (fabs (x->d.x[k] * x->d.A[k * x->d.n + k]) > PW_MODES_SMALL * x->unit[i]) x->impulse[i] -= x->d.x[k];
+    x->struck[i] |= x->d.x[k] != 0;
+    x->rests[i] = fabs (x->u[i]) <= PW_MODES_SMALL * x->unit[i];
   }
   return PW_OK;
 }
