@@ -140,10 +140,12 @@ TEST (bad) {
   cli_bad_each ("linearise", each, sizeof each / sizeof *each);
   cli_good ("pinwheel linearise snakeboard -o @/board >/dev/null");
   assert_null (strstr (cli_file ("board.json"), "\"im\": -0,"));
-  cli_bad ("pinwheel linearise pendulum --at 1 --limit 1e-9", 4, "t = 0 s: the limit of TIME is reached (--limit)");
+  cli_bad ("pinwheel linearise pendulum --at 1 --limit 1e-9", 4,
+           "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
   cli_bad ("pinwheel linearise pendulum --limit 1", 2, "--limit 1: only with --at or --steady");
   cli_bad ("pinwheel show pendulum --limit 1", 2, "--limit 1: only with --at");
-  cli_bad ("pinwheel show pendulum --at 1 --limit 1e-9", 4, "t = 0 s: the limit of TIME is reached (--limit)");
+  cli_bad ("pinwheel show pendulum --at 1 --limit 1e-9", 4,
+           "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
   assert_null (cli_file ("none.json"));
   assert_null (cli_file ("none.csv"));
   assert_null (cli_file ("none.json.part"));

@@ -40,7 +40,7 @@ TEST (limit) {
             "pinwheel run ezyroller --method %s --t-end 1e9 --limit 0.02 --max-steps 1e9 --every 1 -o @/l.csv",
             method[i])),
         4);
-    assert_non_null (strstr (cli_err, "s: the limit of TIME is reached (--limit)"));
+    assert_non_null (strstr (cli_err, "s: the limit of 0.02 s of processor time is reached (--limit)"));
     assert_non_null (strstr (cli_err, "the table so far is kept in "));
   }
   assert_int_equal (cli_run ("pinwheel run ezyroller --t-end 1e9 --specialise never --limit 0.1 --checkpoint @/l.ck "
@@ -81,7 +81,7 @@ TEST (limit_opening) {
   limits_write_struts ("struts.yaml");
   for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
     assert_int_equal (cli_run (check_text ("pinwheel %s --limit 0.1", command[i])), 4);
-    assert_non_null (strstr (cli_err, "the limit of TIME is reached before the first "
+    assert_non_null (strstr (cli_err, "the limit of 0.1 s of processor time is reached before the first "
                                       "step (--limit)"));
   }
   assert_null (cli_file ("o.csv"));
@@ -101,14 +101,14 @@ TEST (rows) {
   assert_int_equal (cli_run ("pinwheel sweep ezyroller --vary M0=0.05,0.1 --t-end 1e9 --limit 0.02 -o @/s.csv"), 4);
   assert_non_null (strstr (cli_err, "all 2 runs failed, the first one: t = "));
   const char *table = cli_file ("s.csv");
-  assert_true (table && strstr (table, ",method,") && strstr (table, "the limit of TIME"));
+  assert_true (table && strstr (table, ",method,") && strstr (table, "the limit of 0.02 s of processor time"));
   cli_shell ("pinwheel sweep ezyroller --vary M0=1e-9,0.1 --method erk8 --t-end 10 --max-steps 20 -o @/n.csv");
   assert_non_null (strstr (cli_err, "1 of 2 runs failed, the first of them: "));
   assert_non_null (strstr (cli_err, "max-steps"));
   cli_shell (
       "pinwheel drift ezyroller --methods rk4,erk8 --only-methods --t-end 100 --step 1e-4 --limit 0.1 --plots @/d");
   assert_non_null (strstr (cli_out, "\nerk8 "));
-  assert_non_null (strstr (cli_out, "the limit of TIME is reached (--limit)"));
+  assert_non_null (strstr (cli_out, "the limit of 0.1 s of processor time is reached (--limit)"));
 }
 
 /* A checkpoint from before the limit goes on, under a larger one, to the same bytes. */
