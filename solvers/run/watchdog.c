@@ -283,16 +283,19 @@ static double change_sine_at (pw_run *r, double t, const double *q) {
   return pw_watchdog_sine (r, NULL);
 }
 
-/* 1 if the sine is low somewhere on the straight line between the ends of a long step.  The sample arrays are
- * scratch. */
+/* The sine on the straight line between the ends of the last step, at this share of it.  r->q_at is scratch. */
+static double change_sine_between (pw_run *r, double share) {
+  const double *from = r->watchdog.previous_q, t = r->watchdog.previous_t;
+  for (int j = 0; j < r->s->coords; j++) r->q_at[j] = from[j] + share * (r->q[j] - from[j]);
+  return change_sine_at (r, t + share * (r->t - t), r->q_at);
+}
+
+/* 1 if the sine is low somewhere on this line in a long step. */
 static int change_low_between (pw_run *r, double length) {
   const pw_watchdog *watch = &r->watchdog;
   int parts = (int)fmin (length / r->thresholds.stride, CHANGE_EVALUATIONS) + 1;
-  for (int i = 1; i < parts; i++) {
-    double part = (double)i / parts, t = watch->previous_t + part * (r->t - watch->previous_t);
-    for (int j = 0; j < r->s->coords; j++) r->q_at[j] = watch->previous_q[j] + part * (r->q[j] - watch->previous_q[j]);
-    if (change_sine_at (r, t, r->q_at) < r->thresholds.low * watch->largest_sine) return 1;
-  }
+  for (int i = 1; i < parts; i++)
+    if (change_sine_between (r, (double)i / parts) < r->thresholds.low * watch->largest_sine) return 1;
   return 0;
 }
 
@@ -530,7 +533,7 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
 /* 1 if the last step may have passed a dead point, where the sine vanishes.  K: its largest change per unit of motion.
  * It is positive within a distance of sine / K from the end of the step.  Where it is nowhere low, the step is close to
  * the motion, here to a straight line, and the sine is positive between two places whose sines exceed K times their
- * distance in sum.  start: a lower bound of the sine at the beginning.  r->q_at is scratch. */
+ * distance in sum.  start: a lower bound of the sine at the beginning. */
 static int dead_may_be_passed (pw_run *r, double start) {
   const pw_watchdog *watch = &r->watchdog;
   const double change = r->thresholds.lipschitz * watch->largest_sine * watch->step_length, end = watch->checked_sine;
@@ -539,10 +542,7 @@ static int dead_may_be_passed (pw_run *r, double start) {
   const int parts = 1 + (int)fmin (DEAD_SAMPLES * change / end, DEAD_PARTS);
   int may = 0;
   for (int i = 1; i <= parts && !may; i++) {
-    const double part = (double)i / parts, t = watch->previous_t + part * (r->t - watch->previous_t);
-    const double *q0 = watch->previous_q;
-    for (int j = 0; j < r->s->coords && i < parts; j++) r->q_at[j] = q0[j] + part * (r->q[j] - q0[j]);
-    const double sine = i < parts ? change_sine_at (r, t, r->q_at) : end;
+    const double sine = i < parts ? change_sine_between (r, (double)i / parts) : end;
     may = !(fmin (start, sine) > low && start + sine > change / parts);
     start = sine;
   }
