@@ -149,13 +149,14 @@ static double circle_reach (const pw_run *r, int i, double rate) {
 }
 
 /* The longest step that follows the direction of a circle that slides, with this A L.  |u| does not fall below half.
- * Where it is small, but not round-off, e is 0 or the lag of d behind n, of the rate w, which is about w A L h^2 / |u|,
- * below CIRCLE_LAG; fixed steps begin short where it begins to slide, and double. */
+ * Where it is small, but no error of the method, e is 0 or the lag of d behind n, of the rate w, which is about
+ * w A L h^2 / |u|, below CIRCLE_LAG; fixed steps begin short where it begins to slide, and double. */
 static double circle_longest (pw_run *r, int i, double rate) {
   pw_events *x = r->events;
   const double h = circle_reach (r, i, rate) / rate;
   const double u[2] = { circle_speed (r->w, x->row[i]), circle_speed (r->w, x->row[i + 1]) }, size = hypot (u[0], u[1]);
-  const int near = size<4 * h * rate, moves = size> PW_MODES_SMALL * x->unit[i];
+  const double still = fmax (PW_MODES_SMALL, r->fixed_steps ? 0 : r->settings.rtol) * x->unit[i];
+  const int near = (size < 4 * h * rate), moves = (size > still);
   double longest = INFINITY, a[2], shortest = near ? h / CIRCLE_PARTS : h;
   pw_mul_J (r->w, r->a, x->lambda);
   pw_evaluate_gamma (r->w, x->gamma);
@@ -173,7 +174,8 @@ double pw_modes_begin_step (pw_run *r) {
   pw_events *x = r->events;
   double longest = INFINITY;
   for (int i = 0; i < x->count; i++)
-    if (x->limit[i].circle == 1 && x->mode[i]) longest = fmin (longest, circle_longest (r, i, circle_rate (r, i)));
+    if (x->limit[i].circle == 1 && x->mode[i] && !x->still[i])
+      longest = fmin (longest, circle_longest (r, i, circle_rate (r, i)));
   for (int i = 0; i < x->count; i++) {
     double n[2], by_u[4];
     if (x->limit[i].circle != 1 || x->mode[i] == 0) continue;
