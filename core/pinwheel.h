@@ -607,8 +607,7 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the driven body, the body with the reaction; "ground" for one of them */
   double stiffness, damping;  /* torque per error of angle [N m/rad], of angular velocity [N m s/rad]; >= 0 */
-  double limit;               /* largest torque [N m]; 0 and not specified: no limit */
-  int specified;              /* 1: the limit is specified even if it is 0 */
+  double limit;               /* largest torque [N m]; 0: no limit */
   pw_signal angle, rate;      /* targets of phi1 - phi2 [rad], of omega1 - omega2 [rad/s] */
 } pw_motor;
 

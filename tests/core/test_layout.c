@@ -247,7 +247,7 @@ TEST (definitions) {
     { "friction", 0xb489bb9d66b7e9b4 },      { "sliding-friction", 0x5fd1939a23f75811 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
     { "force", 0x74eb3b9f27c269 },           { "on-curve", 0xd956d93e2d1765bd },
-    { "torque", 0xd760d1152b443519 },        { "motor", 0xf10d838c7437bc39 },
+    { "torque", 0xd760d1152b443519 },        { "motor", 0x1988e9bb33ec3a81 },
     { "state", 0xbd1a13601c72c5f8 },         { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;

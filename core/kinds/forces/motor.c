@@ -34,7 +34,6 @@ static inline motor_state motor_at (const pw_batch *batch, int e) {
 
 PREPARE (motor_prepare, pw_motor, motor) {
   *element = (motor){ definition->stiffness, definition->damping, definition->limit };
-  if (definition->specified && definition->limit == 0) element->stiffness = element->damping = 0;
   return PW_OK;
 }
 
@@ -75,7 +74,7 @@ static const pw_field motor_fields[] = {
   { PW_AT (pw_motor, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
     .about = "torque per angular velocity error" },
   { PW_AT (pw_motor, limit), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE,
-    .given = offsetof (pw_motor, specified), .about = "largest torque; left out: no limit" },
+    .about = "largest torque; 0: no limit" },
   { PW_AT (pw_motor, angle), PW_SIGNAL, .unit = "rad",
     .about = "target angle of the first body relative to the second" },
   { PW_AT (pw_motor, rate), PW_SIGNAL, .unit = "rad/s",
