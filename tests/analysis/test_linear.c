@@ -83,8 +83,8 @@ SCENE (linear_rotor) {
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "arm", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "arm", "link" }, .at = { { R, 0 }, { -l, 0 } } });
   pw_add_speed (
-      m, &(pw_speed){
-             .name = "turn", .body = "arm", .at = { 1, 0 }, .heading = PW_PI / 2, .value = { PW_CONSTANT, { W } } });
+      m,
+      &(pw_speed){ .name = "turn", .body = "arm", .at = { 1, 0 }, .heading = PW_PI / 2, .value = { .constant = W } });
 }
 
 TEST (rotor) {
@@ -100,7 +100,7 @@ TEST (rotor) {
 SCENE (linear_sleigh) {
   pw_add_body (m, &(pw_body){ .name = "sleigh", .mass = 3, .inertia = 0.5, .start = { 0, 0, 0.3 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = "sleigh", .at = { -0.2, 0 } });
-  pw_add_speed (m, &(pw_speed){ .name = "tow", .body = "sleigh", .at = { -0.2, 0 }, .value = { PW_CONSTANT, { -4 } } });
+  pw_add_speed (m, &(pw_speed){ .name = "tow", .body = "sleigh", .at = { -0.2, 0 }, .value = { .constant = -4 } });
 }
 
 TEST (sleigh) {

@@ -116,7 +116,7 @@ SCENE_WITH (modes_vehicle, modes_list, modes_parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "tractor" });
   pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "trailer" });
   pw_add_pin (m, &(pw_pin){ .name = "hitch", .body = { "tractor", "trailer" }, .at = { { 0, 0 }, { L, 0 } } });
-  pw_add_speed (m, &(pw_speed){ .name = "pull", .body = "tractor", .value = { PW_CONSTANT, { u } } });
+  pw_add_speed (m, &(pw_speed){ .name = "pull", .body = "tractor", .value = { .constant = u } });
   pw_add_rotational_spring (
       m, &(pw_rotational_spring){
              .name = "centring", .body = { "tractor", "trailer" }, .stiffness = p->stiffness, .angle = -heading });

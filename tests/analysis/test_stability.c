@@ -106,12 +106,10 @@ SCENE (stability_train) {
     snprintf (body[0], sizeof body[0], "body%d", i), snprintf (body[1], sizeof body[1], "body%d", i - 1);
     pw_add_pin (m, &(pw_pin){ .name = hitch, .body = { body[0], body[1] }, .at = { { train.L[i - 1], 0 } } });
   }
-  pw_add_speed (m, &(pw_speed){ .name = "drive", .body = "body0", .value = { PW_CONSTANT, { train.u } } });
-  pw_add_speed (m, &(pw_speed){ .name = "turn",
-                                .body = "body0",
-                                .at = { 1, 0 },
-                                .heading = PW_PI / 2,
-                                .value = { PW_CONSTANT, { train.w } } });
+  pw_add_speed (m, &(pw_speed){ .name = "drive", .body = "body0", .value = { .constant = train.u } });
+  pw_add_speed (
+      m, &(pw_speed){
+             .name = "turn", .body = "body0", .at = { 1, 0 }, .heading = PW_PI / 2, .value = { .constant = train.w } });
 }
 
 TEST (trailers) {
