@@ -185,7 +185,7 @@ TEST (lines) {
   close (before);
   ssize_t n = pread (file, text, sizeof text - 1, 0);
   close (file);
-  assert_true (n > 0 && due == 60 && again >= 120);
+  assert_true (n > 0 && fabs (due - 60) < 1e-6 && again > 120 - 1e-6); /* times of the clock are rounded */
   text[n] = 0;
   assert_string_equal (text, "pinwheel: ezyroller: 25 %  t = 2.5 of 10 s  3:00 to go\n");
 }
