@@ -143,45 +143,46 @@ static double circle_rate (pw_run *r, int i) {
   return A * x->limit[i].sliding[1];
 }
 
-/* The largest e0, with this A L. */
-static double circle_reach (const pw_run *r, int i, double rate) {
-  return r->fixed_steps ? r->settings.step * rate : sqrt (r->settings.rtol) * r->events->unit[i];
+/* The largest e0. */
+static double circle_reach (const pw_run *r, int i) {
+  const pw_events *x = r->events;
+  return r->fixed_steps ? r->settings.step * x->rate[i] : sqrt (r->settings.rtol) * x->unit[i];
 }
 
-/* The longest step that follows the direction of a circle that slides, with this A L.  |u| does not fall below half.
- * Where it is small, but no error of the method, e is 0 or the lag of d behind n, of the rate w, which is about
- * w A L h^2 / |u|, below CIRCLE_LAG; fixed steps begin short where it begins to slide, and double. */
-static double circle_longest (pw_run *r, int i, double rate) {
+/* The longest step that follows the direction of a circle that slides; h: of e0 = A L h.  In it |u| does not fall below
+ * half.  Where |u| is small, but not round-off, e is 0, or the lag of d behind n, about w A L h^2 / |u| with the rate w
+ * of n, is below CIRCLE_LAG.  There fixed steps begin short when it begins to slide, and double. */
+static double circle_longest (pw_run *r, int i) {
   pw_events *x = r->events;
-  const double h = circle_reach (r, i, rate) / rate;
+  const double rate = x->rate[i], h = circle_reach (r, i) / rate;
   const double u[2] = { circle_speed (r->w, x->row[i]), circle_speed (r->w, x->row[i + 1]) }, size = hypot (u[0], u[1]);
-  const double still = fmax (PW_MODES_SMALL, r->fixed_steps ? 0 : r->settings.rtol) * x->unit[i];
-  const int near = (size < 4 * h * rate), moves = (size > still);
-  double longest = INFINITY, a[2], shortest = near ? h / CIRCLE_PARTS : h;
+  const int near = (size < 4 * h * rate), moves = (size > PW_MODES_SMALL * x->unit[i]);
+  double longest = near && r->fixed_steps ? x->stride : INFINITY, a[2];
   pw_mul_J (r->w, r->a, x->lambda);
   pw_evaluate_gamma (r->w, x->gamma);
   for (int m = 0; m < 2; m++) a[m] = x->lambda[x->row[i + m]] - x->gamma[x->row[i + m]];
   const double along = u[0] * a[0] + u[1] * a[1], turn = fabs (u[0] * a[1] - u[1] * a[0]);
-  if (near && r->fixed_steps) longest = x->stride;
   if (near && moves)
     longest = fmin (longest, fmax (size / (4 * rate), size * sqrt (CIRCLE_LAG * size / (rate * turn))));
   if (moves && along < 0) longest = fmin (longest, -size * size / (2 * along));
-  longest = fmax (longest, shortest);
+  longest = fmax (longest, near ? h / CIRCLE_PARTS : h);
   return longest < h || !near ? longest : INFINITY;
 }
 
 double pw_modes_begin_step (pw_run *r) {
   pw_events *x = r->events;
   double longest = INFINITY;
-  for (int i = 0; i < x->count; i++)
-    if (x->limit[i].circle == 1 && x->mode[i] && !x->still[i])
-      longest = fmin (longest, circle_longest (r, i, circle_rate (r, i)));
+  for (int i = 0; i < x->count; i++) {
+    if (x->limit[i].circle != 1 || x->mode[i] == 0) continue;
+    x->rate[i] = circle_rate (r, i);
+    if (!x->still[i]) longest = fmin (longest, circle_longest (r, i));
+  }
   for (int i = 0; i < x->count; i++) {
     double n[2], by_u[4];
     if (x->limit[i].circle != 1 || x->mode[i] == 0) continue;
-    const double rate = circle_rate (r, i), speed = circle_direction (r, i, n, by_u);
+    const double speed = circle_direction (r, i, n, by_u);
     x->direction[i] = n[0], x->direction[i + 1] = n[1];
-    x->reach[i] = fmin (circle_reach (r, i, rate), longest * rate);
+    x->reach[i] = fmin (circle_reach (r, i), longest * x->rate[i]);
     x->bias[i] = fmax (0, x->reach[i] - speed / 4);
   }
   x->stride *= 2;
@@ -522,7 +523,8 @@ static int decide_modes (pw_run *r, pw_error *error) {
     x->spare[i] = x->d.redundant[k] && !apart;
     x->direction[i] = x->d.towards[k];
     if (x->limit[i].circle != 1) continue;
-    x->bias[i] = x->reach[i] = circle_reach (r, i, circle_rate (r, i));
+    x->rate[i] = circle_rate (r, i);
+    x->bias[i] = x->reach[i] = circle_reach (r, i);
     if (x->mode[i] && x->before[i] == 0) x->stride = CIRCLE_FIRST * r->w->scale.time;
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {

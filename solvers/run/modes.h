@@ -36,8 +36,8 @@ typedef struct pw_events {
   double stride;             /* longest next fixed step [s] where a circle has begun to slide, and u is small */
   double *memory;            /* of pw_first_crossing */
   double *u, *u_before, *impulse;
-  const unsigned char *origin;      /* of initial values: of the run; NULL in a restart */
-  double *direction, *bias, *reach; /* d, e and e0 of circles */
+  const unsigned char *origin;             /* of initial values: of the run; NULL in a restart */
+  double *direction, *bias, *reach, *rate; /* d, e, e0 and A L of circles */
   double *offset;   /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
   int at_end;       /* 1: the state reached, its multipliers and its J are known */
   int samples;      /* 1: J has been evaluated elsewhere since */
@@ -81,8 +81,8 @@ void pw_modes_u (pw_run *r, const double *v, int g, double *u);
 /* Makes the modes those of the run: r->enforced, and the given multipliers of the other equations. */
 void pw_modes_apply (pw_run *r);
 
-/* Before a step: the direction of the forces on circles, from the state reached.  Returns the longest step in which
- * fixed steps follow it. */
+/* Before a step: the direction of the forces on circles, from the state reached.  Returns the longest step that
+ * follows it; INFINITY: any. */
 double pw_modes_begin_step (pw_run *r);
 
 /* ---- Decisions at an instant ---- */

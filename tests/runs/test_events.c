@@ -261,7 +261,7 @@ TEST (circles) {
   static const struct {
     const char *method;
     double rtol, bound;
-  } of[] = { { "erk8+projection", 1e-11, 2e-8 }, { "erk5+projection", 1e-10, 5e-8 }, { "radau+ggl", 1e-11, 2e-7 },
+  } of[] = { { "erk8+projection", 1e-11, 2e-8 }, { "erk5+projection", 1e-10, 2e-8 }, { "radau+ggl", 1e-11, 2e-7 },
              { "ida+ggl", 1e-12, 5e-8 },         { "bdf+projection", 1e-12, 5e-8 },  { "adams+none", 1e-12, 5e-8 } };
   for (int i = 0; i < 2; i++)
     for (size_t k = 0; k < sizeof of / sizeof *of; k++)
