@@ -1,9 +1,13 @@
 /* Sine and cosine of an angle [rad], the same on every machine; for |x| >= PW_SINE_LIMIT, infinity and NaN those of the
- * C library.  Elliptic functions.  The placeholder of derivatives by differences, to which element types refer. */
+ * C library.  Elliptic functions, Gauss's rule.  The placeholder of derivatives by differences, to which element types refer. */
 #include <float.h>
 #include <math.h>
 #include "pinwheel.h"
 #include "sine.h"
+#include "util.h"
+
+const double pw_gauss_node[] = { 0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363 };
+const double pw_gauss_weight[] = { 0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763 };
 
 void pw_sin_cos (double x, double *sine, double *cosine) {
   if (fabs (x) < PW_SINE_LIMIT) {

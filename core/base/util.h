@@ -151,6 +151,10 @@ char *pw_alloc_arrays (pw_arena *a, const pw_array *array, size_t arrays);
 #define PW_ALLOC_ARRAYS(...) pw_alloc_arrays (NULL, PW_ARRAYS (__VA_ARGS__))
 #define PW_ARENA_ARRAYS(arena, ...) pw_alloc_arrays (arena, PW_ARRAYS (__VA_ARGS__))
 
+/* Gauss's rule of 8 points on [-1, 1] (Abramowitz & Stegun 1964, table 25.4): the positive nodes, ascending, and their
+ * weights. */
+extern const double pw_gauss_node[4], pw_gauss_weight[4];
+
 /* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  For libraries that crash if an allocation fails. */
 int pw_check_memory (size_t bytes);
 

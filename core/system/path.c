@@ -36,16 +36,14 @@ static inline void piece_point (const piece *c, double u, double out[2][4]) {
   }
 }
 
-/* The arc length from u = 0 to u, by Gauss's rule of 8 points (Abramowitz & Stegun 1964, table 25.4). */
+/* The arc length from u = 0 to u, by Gauss's rule. */
 static double piece_length (const piece *c, double u) {
-  static const double node[] = { 0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363 },
-                      weight[] = { 0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763 };
   double sum = 0;
   for (int i = 0; i < 8; i++) {
-    double at = u / 2 * (1 + (i < 4 ? node[i] : -node[i - 4]));
+    double at = u / 2 * (1 + (i < 4 ? pw_gauss_node[i] : -pw_gauss_node[i - 4]));
     double point[2][4];
     piece_point (c, at, point);
-    sum += weight[i % 4] * sqrt (point[0][1] * point[0][1] + point[1][1] * point[1][1]);
+    sum += pw_gauss_weight[i % 4] * sqrt (point[0][1] * point[0][1] + point[1][1] * point[1][1]);
   }
   return u / 2 * sum;
 }

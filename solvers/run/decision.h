@@ -7,8 +7,8 @@
 #define PW_DECISION_DEPENDENT 1e-11 /* least pivot over the diagonal of A, a squared sine; its round-off is 1e-13 */
 
 /* n equations; arrays of that length, unless said otherwise.  z = b - A x are their accelerations or, in impacts,
- * velocities; x are their multipliers or impulses.  An equation that
- * depends on constraints outside of the problem has z = b: its row and column of A are 0. */
+ * velocities; x are their multipliers or impulses.  An equation that depends on constraints outside of the problem has
+ * z = b: its row and column of A are 0. */
 typedef struct {
   int n, *list; /* the equations, by their number in `limit` */
   const pw_bounds *limit;

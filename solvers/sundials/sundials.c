@@ -120,7 +120,7 @@ int pw_sun_open (pw_sun *x, pw_run *r, int unknowns, pw_rates_at *rates) {
   x->memory =
       PW_ALLOC_ARRAYS (PW_ARRAY (x->ledger0, entries), PW_ARRAY (x->integral, entries), PW_ARRAY (x->finer, entries),
                        PW_ARRAY (x->node, entries), PW_ARRAY (rate, PW_SUN_POINTS * entries));
-  for (int i = 0; i < PW_SUN_POINTS; i++) x->rate[i] = rate + i * r->entries;
+  for (int i = 0; x->memory && i < PW_SUN_POINTS; i++) x->rate[i] = rate + i * r->entries;
   if (x->memory == NULL || pw_check_memory (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
       SUNContext_Create (NULL, &x->context) != 0)
     return PW_RESOURCE;
@@ -266,18 +266,15 @@ char *pw_library_versions (char *buffer, size_t size) {
 static const double quadrature_node[] = { 0.8611363115940526, 0.3399810435848563 },
                     quadrature_weight[] = { 0.3478548451374538, 0.6521451548625461 };
 
-/* The same with eight nodes, exact up to degree 15. */
-static const double fine_node[] = { 0.9602898564975363, 0.7966664774136267, 0.5255324099163290, 0.1834346424956498 },
-                    fine_weight[] = { 0.1012285362903763, 0.2223810344533745, 0.3137066458778873, 0.3626837833783620 };
-
 /* x->integral: between two times, of the polynomial of this degree through the rates at the newest states (Lagrange's
  * formula); x->node: less that of the polynomial of the next lower degree (Newton's formula). */
 static void quadrature_polynomial (const pw_sun *x, int degree, double from, double to) {
   const int entries = x->run->entries;
   const double half = (to - from) / 2;
-  double last = 0; /* integral of the product of t - t_j, j < degree */
-  const int pairs = degree > 7 ? 4 : 2;
-  const double *node = degree > 7 ? fine_node : quadrature_node, *weight = degree > 7 ? fine_weight : quadrature_weight;
+  double last = 0;                      /* integral of the product of t - t_j, j < degree */
+  const int pairs = degree > 7 ? 4 : 2; /* of nodes; eight are exact up to degree 15 */
+  const double *node = degree > 7 ? pw_gauss_node : quadrature_node,
+               *weight = degree > 7 ? pw_gauss_weight : quadrature_weight;
   pw_pair at[4], product[4]; /* nodes, from `from` on; there, the product of all t - t_j, weighted */
   memset (x->integral, 0, (size_t)entries * sizeof *x->integral);
   memset (x->node, 0, (size_t)entries * sizeof *x->node);
