@@ -197,7 +197,10 @@ static void table_json (const table_cells *t, FILE *f) {
     pw_json_open (&j, table_cell (t, -1, k, &value, &is_text), '[');
     for (long i = 0; i < t->rows; i++) {
       const char *cell = table_cell (t, i, k, &value, &is_text);
-      is_text &&*cell ? pw_json_text (&j, NULL, cell) : pw_json_number (&j, NULL, value);
+      if (is_text && *cell)
+        pw_json_text (&j, NULL, cell);
+      else
+        pw_json_number (&j, NULL, value);
     }
     pw_json_close (&j, ']');
   }

@@ -961,7 +961,14 @@ static void fit_draw (const void *context, pw_curves *c) {
 
 #define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 
-static const pw_results fit_results = { "fit", "data and fitted model", 0, 2, fit_table, fit_json, fit_draw };
+static const pw_results fit_results = {
+  .name = "fit",
+  .title = "data and fitted model",
+  .lines = 2,
+  .table = fit_table,
+  .json = fit_json,
+  .draw = fit_draw,
+};
 
 static int fit_options (pw_fit *fit, pw_error *error) {
   fit->confidence = pw_cli_given_or (fit->confidence_given, 0.95);

@@ -689,7 +689,12 @@ static void optimise_draw (const void *context, pw_curves *c) {
 }
 
 static const pw_results optimise_results = {
-  "optimise", "runs of the optimisation", 0, 2, optimise_yaml, optimise_json, optimise_draw
+  .name = "optimise",
+  .title = "runs of the optimisation",
+  .lines = 2,
+  .table = optimise_yaml,
+  .json = optimise_json,
+  .draw = optimise_draw,
 };
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {

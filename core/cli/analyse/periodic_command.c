@@ -474,8 +474,15 @@ static void periodic_draw (const void *context, pw_curves *c) {
   periodic_draw_multipliers (cmd, c, range);
 }
 
-static const pw_results periodic_results = { "periodic",    "periodic motions", 1, 1, periodic_csv,
-                                             periodic_json, periodic_draw };
+static const pw_results periodic_results = {
+  .name = "periodic",
+  .title = "periodic motions",
+  .takes_folder = 1,
+  .lines = 1,
+  .table = periodic_csv,
+  .json = periodic_json,
+  .draw = periodic_draw,
+};
 
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;

@@ -323,7 +323,13 @@ static void sensitivity_draw (const void *context, pw_curves *c) {
 }
 
 static const pw_results sensitivity_results = {
-  "sensitivity", "derivatives along the run", 1, 5, sensitivity_csv, sensitivity_json, sensitivity_draw
+  .name = "sensitivity",
+  .title = "derivatives along the run",
+  .takes_folder = 1,
+  .lines = 5,
+  .table = sensitivity_csv,
+  .json = sensitivity_json,
+  .draw = sensitivity_draw,
 };
 
 /* Sets the values of unknown initial states to those of the consistent initial state. */

@@ -551,8 +551,15 @@ static void steady_draw (const void *context, pw_curves *c) {
       if (!p->linear.rigid[i]) pw_curves_point (c, p->linear.re[i], p->linear.im[i], p->motion.parameter);
 }
 
-static const pw_results steady_results = { "steady",   "eigenvalues of steady motions", 1, 1, steady_csv, steady_json,
-                                           steady_draw };
+static const pw_results steady_results = {
+  .name = "steady",
+  .title = "eigenvalues of steady motions",
+  .takes_folder = 1,
+  .lines = 1,
+  .table = steady_csv,
+  .json = steady_json,
+  .draw = steady_draw,
+};
 
 /* Finds steady motions of the model; with --vary branches that begin at the ends of the range or, if there are none,
  * at the value of the model or within the range. */
