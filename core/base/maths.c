@@ -1,5 +1,6 @@
 /* Sine and cosine of an angle [rad], the same on every machine; for |x| >= PW_SINE_LIMIT, infinity and NaN those of the
- * C library.  Elliptic functions, Gauss's rule.  The placeholder of derivatives by differences, to which element types refer. */
+ * C library.  Elliptic functions, Gauss's rule.  The placeholder of derivatives by differences, to which element types
+ * refer. */
 #include <float.h>
 #include <math.h>
 #include "pinwheel.h"
