@@ -314,7 +314,8 @@ static void show_model (const pw_cli_model *m) {
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const char *path = f->type == PW_TRACK ? yaml_path (m->model, e) : "";
       if (path == NULL) continue;
-      if (f->type == PW_TEXT && yaml_is_default (f, e->definition, (const char *)e->definition + f->offset)) continue;
+      const int may_be_missing = f->type == PW_TEXT || f->given || f->limit; /* which 0 does not say */
+      if (may_be_missing && yaml_is_default (f, e->definition, (const char *)e->definition + f->offset)) continue;
       printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
       yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
       fputs (path, stdout);

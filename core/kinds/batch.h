@@ -132,13 +132,13 @@ static inline int limit_given (const pw_signal *limit) {
 static inline int limit_check (const char *field, const pw_signal *most, const pw_signal *sliding, pw_error *error) {
   const double largest = most->type == PW_CONSTANT ? most->constant : INFINITY;
   if (largest < 0) return pw_fail (error, PW_INPUT, "%s = %g: expected a number >= 0", field, largest);
+  if (!limit_given (most) && limit_is_nonzero (sliding))
+    return pw_fail (error, PW_INPUT, "%s_sliding without %s", field, field);
   if (sliding->type == PW_CONSTANT && sliding->constant < 0)
     return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected a number >= 0", field, sliding->constant);
   if (sliding->type == PW_CONSTANT && sliding->constant > largest)
     return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding->constant, field,
                     largest);
-  if (!limit_given (most) && limit_is_nonzero (sliding))
-    return pw_fail (error, PW_INPUT, "%s_sliding without %s", field, field);
   return PW_OK;
 }
 

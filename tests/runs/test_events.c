@@ -534,6 +534,7 @@ SCENE (events_bad) {
   pw_wheel wheel = { .name = "W", .body = "a", .grip = { .constant = 2 } };
   wheel.grip_sliding.constant = strcmp (events_wrong, "grip") == 0 ? 3 : 0;
   if (strcmp (events_wrong, "grip-sliding") == 0) wheel.grip.constant = 0, wheel.grip_sliding.type = PW_HARMONIC;
+  if (strcmp (events_wrong, "grip-missing") == 0) wheel.grip.constant = 0, wheel.grip_sliding.constant = 1;
   if (strcmp (events_wrong, "axle") == 0) wheel.grip.constant = 0;
   pw_add_wheel (m, &wheel);
   wheel.name = "V", wheel.at[1] = 1;
@@ -567,6 +568,7 @@ TEST (bad_elements) {
     { "negative", "model scene: friction F: limit = -2: expected a number >= 0" },
     { "without", "model scene: friction F: limit_sliding: expected none, unless friction is exact: a limit, no speed" },
     { "grip-sliding", "model scene: wheel W: grip_sliding without grip" },
+    { "grip-missing", "model scene: wheel W: grip_sliding without grip" },
     { "signal", "model scene: friction F: limit: a signal: expected a number, unless friction is exact: no speed" },
     { "stop", "model scene: stop S: low = 1, high = 1: expected low < high" },
     { "disc", "model scene: contact C: heading = 1: expected none: with other_radius, body 2 has a disc, not a line" },
