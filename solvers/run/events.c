@@ -43,12 +43,12 @@ static int events_allocate (pw_run *r) {
       PW_ARRAY (x->bias, n), PW_ARRAY (x->reach, n), PW_ARRAY (x->rate, n), PW_ARRAY (x->d.towards, n),
       PW_ARRAY (x->mean, n), PW_ARRAY (x->start, 2 * n), PW_ARRAY (x->end, 2 * n), PW_ARRAY (x->now, 2 * n),
       PW_ARRAY (x->previous, 2 * n), PW_ARRAY (x->mode, n), PW_ARRAY (x->before, n), PW_ARRAY (x->d.trial, n),
-      PW_ARRAY (x->armed, n), PW_ARRAY (x->triggered, n), PW_ARRAY (x->rests, n), PW_ARRAY (x->struck, n),
-      PW_ARRAY (x->still, n), PW_ARRAY (x->d.blocked, n), PW_ARRAY (x->spare, n), PW_ARRAY (x->d.fixed, n),
-      PW_ARRAY (x->d.redundant, n), PW_ARRAY (x->row, n), PW_ARRAY (x->d.list, n), PW_ARRAY (x->d.held, n),
-      PW_ARRAY (x->partner, n), PW_ARRAY (x->place, n), PW_ARRAY (x->d.normal, n), PW_ARRAY (r->coupling, n),
-      PW_ARRAY (r->coupling_memory, 2 * coords + rows + n * (n + 1)), PW_ARRAY (x->enforced, rows),
-      PW_ARRAY (x->other, rows), PW_ARRAY (x->d.choice, 2 * n), PW_ARRAY (x->d.A, n * n),
+      PW_ARRAY (x->armed, n), PW_ARRAY (x->away, n), PW_ARRAY (x->triggered, n), PW_ARRAY (x->rests, n),
+      PW_ARRAY (x->struck, n), PW_ARRAY (x->still, n), PW_ARRAY (x->d.blocked, n), PW_ARRAY (x->spare, n),
+      PW_ARRAY (x->d.fixed, n), PW_ARRAY (x->d.redundant, n), PW_ARRAY (x->row, n), PW_ARRAY (x->d.list, n),
+      PW_ARRAY (x->d.held, n), PW_ARRAY (x->partner, n), PW_ARRAY (x->place, n), PW_ARRAY (x->d.normal, n),
+      PW_ARRAY (r->coupling, n), PW_ARRAY (r->coupling_memory, 2 * coords + rows + n * (n + 1)),
+      PW_ARRAY (x->enforced, rows), PW_ARRAY (x->other, rows), PW_ARRAY (x->d.choice, 2 * n), PW_ARRAY (x->d.A, n * n),
       PW_ARRAY (x->d.factor, n * (n + 1)), PW_ARRAY (x->f, coords), PW_ARRAY (x->a, coords), PW_ARRAY (x->gamma, rows),
       PW_ARRAY (x->lambda, 2 * rows), PW_ARRAY (x->memory, 2 * n * (PW_CROSSING_DEPTH + 2)),
       PW_ARRAY (r->reaction, rows), PW_ARRAY (r->given, rows));
@@ -705,6 +705,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->bias, (size_t)x->count * sizeof *x->bias);
   pw_archive_bytes (a, x->reach, (size_t)x->count * sizeof *x->reach);
   pw_archive_bytes (a, &x->stride, sizeof x->stride);
+  pw_archive_bytes (a, x->away, (size_t)x->count);
   pw_archive_bytes (a, &x->pending, sizeof x->pending);
   pw_archive_bytes (a, &x->fell, sizeof x->fell);
   pw_archive_bytes (a, x->mean, (size_t)x->count * sizeof *x->mean);

@@ -151,12 +151,14 @@ static double circle_reach (const pw_run *r, int i) {
 
 /* The longest step that follows the direction of a circle that slides; h: of e0 = A L h.  In it |u| does not fall below
  * half.  Where |u| is small, but not round-off, e is 0, or the lag of d behind n, about w A L h^2 / |u| with the rate w
- * of n, is below CIRCLE_LAG.  There fixed steps begin short when it begins to slide, and double. */
+ * of n, is below CIRCLE_LAG.  There fixed steps begin short when it begins to slide, and double; of adaptive ones, only
+ * those that return there are limited: before, a small u may be an error. */
 static double circle_longest (pw_run *r, int i) {
   pw_events *x = r->events;
   const double rate = x->rate[i], h = circle_reach (r, i) / rate;
   const double u[2] = { circle_speed (r->w, x->row[i]), circle_speed (r->w, x->row[i + 1]) }, size = hypot (u[0], u[1]);
-  const int near = (size < 4 * h * rate), moves = (size > PW_MODES_SMALL * x->unit[i]);
+  const int near = (size < 4 * h * rate), moves = (r->fixed_steps || x->away[i]) && size > PW_MODES_SMALL * x->unit[i];
+  x->away[i] |= !near;
   double longest = near && r->fixed_steps ? x->stride : INFINITY, a[2];
   pw_mul_J (r->w, r->a, x->lambda);
   pw_evaluate_gamma (r->w, x->gamma);
@@ -175,7 +177,7 @@ double pw_modes_begin_step (pw_run *r) {
   for (int i = 0; i < x->count; i++) {
     if (x->limit[i].circle != 1 || x->mode[i] == 0) continue;
     x->rate[i] = circle_rate (r, i);
-    if (!x->still[i]) longest = fmin (longest, circle_longest (r, i));
+    longest = fmin (longest, circle_longest (r, i));
   }
   for (int i = 0; i < x->count; i++) {
     double n[2], by_u[4];
@@ -525,7 +527,7 @@ static int decide_modes (pw_run *r, pw_error *error) {
     if (x->limit[i].circle != 1) continue;
     x->rate[i] = circle_rate (r, i);
     x->bias[i] = x->reach[i] = circle_reach (r, i);
-    if (x->mode[i] && x->before[i] == 0) x->stride = CIRCLE_FIRST * r->w->scale.time;
+    if (x->mode[i] && x->before[i] == 0) x->stride = CIRCLE_FIRST * r->w->scale.time, x->away[i] = 0;
   }
   for (int k = 0; k < x->d.n && status == PW_OK; k++) {
     const int i = x->d.list[k], circle = x->limit[i].circle;

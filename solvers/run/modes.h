@@ -20,6 +20,7 @@ typedef struct pw_events {
   pw_bounds *limit;                     /* their limits */
   double *force_unit, *unit;            /* of the multiplier; of u */
   signed char *mode, *before;           /* before: those before a decision */
+  unsigned char *away;                  /* 1: u of a circle has left 0 by more than 4 e0 since it slides */
   unsigned char *armed;                 /* 1: u has left its root, so that it may return there */
   unsigned char *triggered;             /* 1: at the root that is the state reached */
   unsigned char *rests;                 /* 1: u is 0 after an impact */
