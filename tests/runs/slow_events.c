@@ -70,7 +70,7 @@ TEST (knife_edges) {
 }
 
 /* Where sliding on a circle begins and ends, changes within the zone in which its direction is smoothed are not
- * resolved: of 2500 vehicles with 49,509 events, 48 differ (docs/events.md). */
+ * resolved: of 2500 vehicles with 49,463 events, 15 differ (docs/events.md). */
 TEST (rolling) {
   static const char *const method[] = { "erk8+projection", "radau+ggl", NULL };
   events_campaign ("rolling wheels", 1, events_number ("COUNT", 100) / 4, (unsigned)events_number ("SEED", 1), method,
