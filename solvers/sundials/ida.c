@@ -152,10 +152,10 @@ static int ida_open_vectors (pw_method_data *d, pw_run *r) {
   return PW_OK;
 }
 
-/* Where J v = eta is enforced: the least factor by which a step grows, while IDA only doubles it by default.  The
- * estimates of the error then need more accurate Newton iterations (the error that may remain, over the tolerance of
- * the error test) and more matrices (the relative change of c from which on there is a new one).  Growth by 1.1 is
- * unstable. */
+/* Where positions and velocities are enforced: the least factor by which a step grows, while IDA only doubles it by
+ * default.  The estimates of the error then need more accurate Newton iterations (the error that may remain, over the
+ * tolerance of the error test) and more matrices (the relative change of c from which on there is a new one).  Growth
+ * by 1.1 is unstable. */
 #define IDA_GROWTH 1.3
 #define IDA_CONVERGENCE 0.1
 #define IDA_CHANGE 0.1
@@ -169,8 +169,9 @@ static int ida_open_integrator (pw_method_data *d) {
       IDASetMaxErrTestFails (m, PW_SUN_ATTEMPTS) || IDASetInitStep (m, pw_first_step (x->run)) ||
       IDASetLinearSolver (m, x->solver, x->matrix) || IDASetJacFn (m, ida_matrix))
     return PW_RESOURCE;
-  if (d->dae.enforces_velocities && (IDASetEtaFixedStepBounds (m, 1, IDA_GROWTH) ||
-                                     IDASetNonlinConvCoef (m, IDA_CONVERGENCE) || IDASetDeltaCjLSetup (m, IDA_CHANGE)))
+  if (d->dae.enforces_positions && d->dae.enforces_velocities &&
+      (IDASetEtaFixedStepBounds (m, 1, IDA_GROWTH) || IDASetNonlinConvCoef (m, IDA_CONVERGENCE) ||
+       IDASetDeltaCjLSetup (m, IDA_CHANGE)))
     return PW_RESOURCE;
   if (!x->run->s->saturates) return PW_OK;
   x->iteration = SUNNonlinSol_Newton (x->y, x->context);
