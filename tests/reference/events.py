@@ -13,7 +13,6 @@ from simulator import Failure, Mechanism, State
 
 # One rate slides in the direction +1 or -1, a vector SLIDES.  (IDLE, direction): at its limit; others keep its rate 0.
 HOLDS, FREE, SLIDES, IDLE = "holds", "free", "slides", "idle"
-ZERO = 1e-9  # [m/s, m] rates and gaps below are 0 at an event
 SLIP = 1e-10  # [m/s] a vector slides from this speed on, and until a tenth of it
 SLOW = 1e-6  # in units of the scene: impacts below do not bounce
 MOST_EVENTS, MOST_STEPS = 400, 4000
@@ -153,13 +152,11 @@ def speeds(limited):
     return np.array([r.x for r in limited.rates])
 
 
-def closed(limited):
-    return limited.gap is not None and (math.isnan(limited.gap) or limited.gap < ZERO)
-
-
 class Motion:
     """A run of a mechanism.  events: (t, reaction, mode before, mode after, impulse or None); arbitrary: reactions of
     which some modes make no difference."""
+
+    zero = 1e-9  # [m/s, m] rates and gaps below are 0 at an event
 
     def __init__(self, m, q, v, span):
         self.m, self.t, self.q, self.v, self.events, self.modes, self.arbitrary = m, 0.0, q, v, [], {}, set()
@@ -171,6 +168,9 @@ class Motion:
 
     def state(self):
         return State(self.m, self.t, self.middle, self.q, self.v)
+
+    def closed(self, limited):
+        return limited.gap is not None and (math.isnan(limited.gap) or limited.gap < self.zero)
 
     def scales(self, span):
         """(L/T, 1/T) of the manual's scales at the start, for lengths and angles."""
@@ -199,7 +199,7 @@ class Motion:
         for e in state.limited:
             u = speeds(e)
             if e.gap is not None:
-                if closed(e) and u[0] < ZERO:
+                if self.closed(e) and u[0] < self.zero:
                     open_.append(e)
                 else:
                     modes[e.name] = FREE
@@ -208,7 +208,7 @@ class Motion:
                     open_.append(e)
                 else:
                     modes[e.name] = int(math.copysign(1, u[0]))
-            elif np.linalg.norm(u) < ZERO:
+            elif np.linalg.norm(u) < self.zero:
                 open_.append(e)
             else:
                 modes[e.name] = int(math.copysign(1, u[0])) if len(u) == 1 else SLIDES
@@ -276,14 +276,13 @@ class Motion:
         """Whether others that hold keep the rates of an equation at 0 that does not."""
         return bool(held) and max(abs(w[rows])) < 1e-7 and dependent(A, held + rows)
 
-    @staticmethod
-    def options(e, excluded, small, slides):
+    def options(self, e, excluded, small, slides):
         if e.gap is not None:
             return one_sided(excluded, small)
         most = e.sliding if slides else e.most
         if e.normal is not None:
             u = speeds(e)[0]
-            return contact_coulomb(most, most, excluded, small, 0 if abs(u) < ZERO else int(math.copysign(1, u)))
+            return contact_coulomb(most, most, excluded, small, 0 if abs(u) < self.zero else int(math.copysign(1, u)))
         return (coulomb if len(e.rates) == 1 else vector_coulomb)(most, excluded, small)
 
     def direct(self, e, n):
@@ -300,8 +299,8 @@ class Motion:
     def impact(self):
         """Impulses where a closed one-sided equation has a negative rate; whether there were any."""
         state = self.state()
-        taking = [e for e in state.limited if e.gap is not None and closed(e) and speeds(e)[0] < ZERO]
-        if not any(speeds(e)[0] < -ZERO for e in taking):
+        taking = [e for e in state.limited if e.gap is not None and self.closed(e) and speeds(e)[0] < self.zero]
+        if not any(speeds(e)[0] < -self.zero for e in taking):
             return False
         equations = [e for e in state.limited if e in taking or e.normal in taking]
         G = np.array([e.rates[0].g for e in equations])
@@ -496,7 +495,7 @@ class Motion:
         for name in values[0]:
             f = [x[name] for x in values]
             one = lambda t, name=name: self.functions(t, dense(t))[name]
-            if begins and f[0] < 1e-9:
+            if begins and f[0] < self.zero:
                 f[0] = 0.0
                 if f[1] < 0:
                     found.append((self.soon(one, times[0], times[1], f[1]), name))
@@ -505,15 +504,17 @@ class Motion:
                 if f[i] >= 0 > f[i + 1]:
                     found.append((brentq(one, times[i], times[i + 1], xtol=1e-15, rtol=8.9e-16), name))
                     break
-            for i in range(1, len(times) - 1):
-                if f[i] > 0 and f[i - 1] > f[i] <= f[i + 1] and f[i] < 0.3 * (f[i - 1] + f[i + 1]):
-                    least = minimize_scalar(one, bounds=(times[i - 1], times[i + 1]), method="bounded",
-                                            options={"xatol": 1e-10})
-                    if least.fun < 0:
-                        found.append((brentq(one, times[i - 1], least.x, xtol=1e-15, rtol=8.9e-16), name))
-                        break
-                    if least.fun < 1e-7:
-                        raise Failure("a motion touches a limit")
+            dips = [(times[i - 1], times[i + 1]) for i in range(1, len(times) - 1)
+                    if f[i] > 0 and f[i - 1] > f[i] <= f[i + 1] and f[i] < 0.3 * (f[i - 1] + f[i + 1])]
+            if begins and 0 < f[0] <= f[1] and one(times[0] + 1e-3 * (times[1] - times[0])) < f[0]:
+                dips.insert(0, (times[0], times[1]))  # a step after an event may be longer than the next phase
+            for start, end in dips:
+                least = minimize_scalar(one, bounds=(start, end), method="bounded", options={"xatol": 1e-10})
+                if least.fun < 0:
+                    found.append((brentq(one, start, least.x, xtol=1e-15, rtol=8.9e-16), name))
+                    break
+                if least.fun < 1e-7:
+                    raise Failure("a motion touches a limit")
         return min(found) if found else None
 
     @staticmethod

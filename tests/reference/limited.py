@@ -122,15 +122,16 @@ def start(b):
     """Random velocities that satisfy the constraints, and some of the equations with limits."""
     m = Mechanism(b.model())
     state = State(m, 0.0, m.middle(0.0), m.q, np.array([b.r.uniform(-1.5, 1.5) for _ in range(m.n)]))
-    rates = [r for _, r, _ in state.rows]
+    constraints, v = [r for _, r, _ in state.rows], state.v
+    rates = list(constraints)
     for e in state.limited:
         if e.gap is None and b.chance(0.6) or e.gap is not None and e.gap != e.gap and e.rates[0].x < 0.1:
             rates += e.rates
-    if rates:
-        J = np.array([r.g for r in rates])
-        v = state.v - np.linalg.lstsq(J, np.array([r.x for r in rates]), rcond=1e-9)[0]
-    else:
-        v = state.v
+    for some in (rates, constraints):  # the first may contradict each other
+        J, x = np.array([r.g for r in some]).reshape(len(some), m.n), np.array([r.x for r in some])
+        u = x + J @ (v - state.v)
+        if max(abs(u), default=0) > 1e-9:
+            v = v - np.linalg.lstsq(J, u, rcond=1e-9)[0]
     for i, body in enumerate(b.bodies):
         body["rate"] = dict(zip(("vx", "vy", "omega"), (float(x) for x in v[3 * i:3 * i + 3])))
     for e in b.elements:
