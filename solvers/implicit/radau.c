@@ -202,8 +202,8 @@ static void radau_set_tolerances (pw_run *r, double h) {
     double size = fabs (d->now.y[i]);
     double offset = settings->atol > 0 && d->unit[i] < INFINITY ? settings->atol / settings->rtol : d->unit[i];
     double typical = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
-    d->tolerance[i] = fmin (rtol * (size + offset), r->tolerance_bound[i]);
     d->round_off[i] = fmin (8 * DBL_EPSILON * (size + typical), 0.1 * r->tolerance_bound[i]);
+    d->tolerance[i] = fmax (fmin (rtol * (size + offset), r->tolerance_bound[i]), d->round_off[i]);
     d->newton_tolerance[i] = r->fixed_steps ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
   }
 }

@@ -58,9 +58,11 @@ static int events_allocate (pw_run *r) {
 
 /* ---- Event functions, positive beyond an event: two for each equation ---- */
 
-/* Below this u [units] is 0 after its root: the error of the method. */
+/* Below this u [units] is 0 after its root: the error of the method, in index 3 round-off of positions over a step. */
 static double events_tolerance (const pw_run *r) {
-  return r->fixed_steps ? 1e-13 : fmax (1e-13, 10 * r->settings.rtol);
+  const double T = r->w->scale.time, h = r->fixed_steps ? r->settings.step : EVENTS_FIRST * T;
+  const double round_off = pw_stabilised_by (r, PW_INDEX3) ? 1024 * DBL_EPSILON * T / h : 1e-13;
+  return fmax (round_off, r->fixed_steps ? 0 : 10 * r->settings.rtol);
 }
 
 /* Event functions where J is evaluated, from the multipliers and velocities. */
@@ -201,7 +203,8 @@ static int events_check_idle (pw_run *r, long known, pw_error *error) {
   x->idle = r->event_count == known && r->t - x->decided_t < EVENTS_IDLE_TIME * r->w->scale.time ? x->idle + 1 : 0;
   x->decided_t = r->t;
   if (x->idle < EVENTS_IDLE) return PW_OK;
-  while (i < x->count - 1 && x->mode[i] == 0) i++;
+  for (int k = 1; k < x->count; k++)
+    if (x->mode[k] && (x->mode[i] == 0 || fabs (x->u[k]) / x->unit[k] < fabs (x->u[i]) / x->unit[i])) i = k;
   return pw_fail (
       error, PW_METHOD,
       "t = %.6g s: whether %s slides is decided by round-off, in ever more decisions that change nothing; use "
@@ -314,6 +317,9 @@ static int events_stop_at (pw_run *r, double t, pw_error *error) {
   int status = t == r->located ? PW_OK : events_at (r, t, x->now, error);
   if (status != PW_OK) return status;
   events_trigger (r, x->now);
+  for (int i = 0; i < x->count; i++) /* velocities that reach 0 together do so within the error of the method */
+    x->triggered[i] |= x->mode[i] && x->armed[i] && x->row[i] >= r->s->holonomic && !x->limit[i].circle &&
+                       x->now[2 * i] > -events_tolerance (r);
   x->pending = 1, x->start_t = NAN;
   for (int i = 0; i < x->count && !x->fell; i++) x->struck[i] &= x->mode[i] != 0 && !x->armed[i];
   if (t == r->t) return PW_OK;

@@ -534,10 +534,10 @@ static int decide_modes (pw_run *r, pw_error *error) {
     const int could = x->d.trial[k] && (circle == 1 || !(circle || x->d.fixed[k]));
     x->still[i] &= could && !pw_is_one_sided (&x->limit[i]) && pw_decision_depends (&x->d, k);
   }
-  for (int k = 0; k < x->d.n && status == PW_OK; k++) {
-    x->d.normal[k] = -1, x->d.trial[k] = (signed char)x->d.fixed[k];
-    x->d.x[k] = 0, x->d.b[k] = x->u[x->d.list[k]];
-  }
+  for (int k = 0; k < x->d.n; k++) x->d.normal[k] = -1;
+  for (int k = 0; k < x->d.n && status == PW_OK; k++)
+    x->d.trial[k] = x->d.fixed[k] || (x->d.trial[k] && pw_decision_depends (&x->d, k)); /* others keep its u */
+  for (int k = 0; k < x->d.n; k++) x->d.x[k] = 0, x->d.b[k] = x->u[x->d.list[k]];
   if (x->d.n > 0 && status == PW_OK) {
     (void)pw_decision_solve (&x->d, 1);
     pw_modes_push (r, saddle, r->v);
