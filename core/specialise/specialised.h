@@ -4,7 +4,7 @@
 
 #include "pinwheel.h"
 
-#define PW_SCENE_ABI 6
+#define PW_SCENE_ABI 7
 enum { PW_STAGES_MOST = 16 }; /* most stages of a Runge-Kutta method */
 /* Least pivot of a constraint equation in the elimination of J M^-1 J^T, relative to its diagonal entry: the squared
  * sine of the angle between its row of J and the rows eliminated before, in the metric of M^-1.  The sine is that below
@@ -44,8 +44,8 @@ typedef struct {
 typedef struct pw_scene_step {
   int stages;           /* stage 0 is the beginning of the step, V[0] and A[0] its velocities and accelerations */
   const pw_rk_row *row; /* [i] stage i > 0; [0] the new state */
-  double h;
-  const double *t;             /* stages: times */
+  const double *c;             /* stages: abscissae */
+  double h, t0, t1;            /* size; times of beginning and end */
   const double *q0;            /* positions at the beginning */
   double *const *V, *const *A; /* stages: velocities, accelerations */
   double *const *R;            /* stages: powers of the ledger's entries [W] */

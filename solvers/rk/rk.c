@@ -274,10 +274,9 @@ static double rk_stage_time (const pw_run *r, int i, double h, double t1) {
 /* Does what rk_stages does by specialised code: 1; 0 if none suits, or it refuses a stage. */
 static int rk_stages_specialised (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
-  double t[PW_RK_STAGES];
   if (r->specialised == NULL || d->holds_signals || d->uses_nullspace) return 0;
-  for (int i = 1; i < d->tableau->stages; i++) t[i] = rk_stage_time (r, i, h, t1);
-  return pw_specialised_stages (r, &(pw_scene_step){ d->tableau->stages, d->row, h, t, r->q, d->stage_v, d->stage_a,
+  return pw_specialised_stages (r, &(pw_scene_step){ d->tableau->stages, d->row, d->tableau->c, h, r->t,
+                                                     pw_before_breakpoint (r, t1), r->q, d->stage_v, d->stage_a,
                                                      d->stage_rate, d->q, d->v, d->lambda });
 }
 
@@ -955,13 +954,12 @@ static int several_count (const pw_run *r, double t, double t_end) {
                last = fmin (r->breakpoint, r->resolved_until) - longer, stop = fmin (t_end - longer, last),
                until = fmin (fmin (t, t_end), r->settings.t + 2 * r->checked_span);
   const int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL);
-  double reached = r->t, number = (double)r->counter.count;
-  int n = 0;
-  if (!(h > 128 * DBL_EPSILON * (fabs (r->t) + most * h))) return 0;
-  for (; n < most && reached < until; n++) {
-    const double next = r->counter.base + ++number * h;
-    if (!(next <= stop || (next == t_end && next <= last))) break;
-    reached = next;
+  const double base = r->counter.base, count = (double)r->counter.count;
+  if (!(h > 128 * DBL_EPSILON * (fabs (r->t) + most * h)) || !(r->t < until)) return 0;
+  int n = (int)fmin (most, (until - r->t) / h + 2);
+  for (; n > 0; n--) {
+    const double end = base + (count + n) * h, beginning = n > 1 ? base + (count + n - 1) * h : r->t;
+    if (beginning < until && (end <= stop || (end == t_end && end <= last))) break;
   }
   return n;
 }
