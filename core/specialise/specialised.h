@@ -44,9 +44,9 @@ typedef struct {
 typedef struct pw_scene_step {
   int stages;           /* stage 0 is the beginning of the step, V[0] and A[0] its velocities and accelerations */
   const pw_rk_row *row; /* [i] stage i > 0; [0] the new state */
-  const double *c;             /* stages: abscissae */
-  double h, t0, t1;            /* size; times of beginning and end */
-  const double *q0;            /* positions at the beginning */
+  const double *c;      /* stages: abscissae */
+  double h, t0, t1;     /* size; times of beginning and end */
+  const double *q0;     /* positions at the beginning */
   double *const *V, *const *A; /* stages: velocities, accelerations */
   double *const *R;            /* stages: powers of the ledger's entries [W] */
   double *q, *v;               /* the new state */
