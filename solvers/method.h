@@ -77,11 +77,15 @@ int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
  * Returns PW_METHOD. */
 int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 
-/* Conditions on states in signals (sides.c). */
+/* Conditions on states in signals, and in outputs of which there may be integrals (sides.c). */
 typedef struct {
+  int functions;
+  pw_source *of;                                     /* functions that have conditions: of signals, then of outputs */
+  int signals;                                       /* conditions of signals, which are the first ones */
   int count;                                         /* conditions; arrays of this length, unless said otherwise */
   int fixed;                                         /* 1: their sides are */
   double *start, *end, *start_rate, *end_rate, *now; /* how far they are beyond their sides in a step, and the rates */
+  double *size;                                      /* the largest value so far, and at a state about L away */
   double *memory;                                    /* of pw_first_crossing */
   double *read;                                      /* states that a signal reads */
   double t, *state;                                  /* 2 coords: where the sides have been fixed */
@@ -91,6 +95,10 @@ typedef struct {
     double t, projected, *q, *ledger; /* as pw_run.q_at, ... */
   } found;                            /* the first sample beyond a side */
 } pw_sides;
+
+/* Stores how far the conditions are beyond their sides at a state; beyond NULL: fixes the sides there; q NULL, too:
+ * frees them (dynamics.c). */
+void pw_run_evaluate_sides (struct pw_run *r, double t, const double *q, const double *v, double *beyond);
 
 /* Fixes the sides at the state reached, where signals must be evaluated again (dynamics.c).  Does nothing without
  * conditions. */

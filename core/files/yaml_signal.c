@@ -320,6 +320,13 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal
   return PW_OK;
 }
 
+/* The conditions of a function that has been read. */
+static void signal_find_sides (pw_signal_function *f, pw_function *function) {
+  double variable[PW_OUTPUT_READS + 1] = { 0 }, side[PW_EXPRESSION_CODES];
+  if (f->states) f->conditions = pw_expression_sides (f->expression[0], variable, side, NULL, NULL);
+  if (f->conditions) function->sides = signal_sides;
+}
+
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
 static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal *signal) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
@@ -344,9 +351,7 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
     if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
   }
   if (f->states) signal->function.reads = f->name + 1;
-  double variable[PW_OUTPUT_READS + 1] = { 0 }, side[PW_EXPRESSION_CODES];
-  if (f->states) f->conditions = pw_expression_sides (f->expression[0], variable, side, NULL, NULL);
-  if (f->conditions) signal->function.sides = signal_sides;
+  signal_find_sides (f, &signal->function);
   return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
 }
 
@@ -816,7 +821,10 @@ static int output_expression (pw_reader *r, int index, int reads) {
   }
   o->reader = PW_OUTPUT_READ;
   r->label = PW_PRINTED (100, "output %s", o->output.name);
-  return pw_yaml_expression (r, &o->node, o->function.name, &o->function.text.part[0], &o->function.expression[0]);
+  pw_signal_function *f = &o->function;
+  if (pw_yaml_expression (r, &o->node, f->name, &f->text.part[0], &f->expression[0]) != PW_OK) return r->error->status;
+  signal_find_sides (f, &o->output.value);
+  return PW_OK;
 }
 
 int pw_yaml_outputs (pw_reader *r) {

@@ -413,17 +413,22 @@ double pw_run_option (const pw_run *r, const char *name) {
   return r->method->options[i].name ? r->option[i] : 0;
 }
 
+void pw_run_evaluate_sides (pw_run *r, double t, const double *q, const double *v, double *beyond) {
+  double *read = r->sides->read;
+  for (const pw_source *x = r->sides->of; x < r->sides->of + r->sides->functions; x++) {
+    for (int i = 0; q && i < x->reads; i++) {
+      const int j = x->state[i];
+      read[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];
+    }
+    const int count = x->signal.function.sides (x->signal.function.context, t, q ? read : NULL, beyond);
+    if (beyond) beyond += count;
+  }
+}
+
 /* Fixes the sides at a state; q NULL: frees them. */
 static void sides_fix (pw_run *r, double t, const double *q, const double *v) {
   if (r->sides == NULL) return;
-  for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
-    if (!pw_source_has_conditions (x)) continue;
-    for (int i = 0; q && i < x->reads; i++) {
-      const int j = x->state[i];
-      x->x[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];
-    }
-    x->signal.function.sides (x->signal.function.context, t, q ? x->x : NULL, NULL);
-  }
+  pw_run_evaluate_sides (r, t, q, v, NULL);
   r->sides->fixed = q != NULL;
   r->w->t_signal = NAN;
 }

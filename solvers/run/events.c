@@ -232,6 +232,7 @@ static int events_prepare (pw_run *r, pw_error *error) {
       if (status == PW_OK) status = pw_modes_decide (r, 0, error);
       if (status == PW_OK) status = events_check_idle (r, known, error);
       r->watchdog.largest_sine = 0;
+      pw_run_fix_sides (r); /* what sticks has the velocity 0 */
       if (status == PW_OK) status = pw_run_renew (r, error);
       if (status == PW_OK) pw_run_set_reference_level (r);
       if (status == PW_OK) status = events_leave (r, error);

@@ -220,7 +220,7 @@ static int run_watched_advance (pw_run *r, double t_end, pw_error *error) {
 
 static int run_watch_steps (pw_run *r, pw_error *error) {
   r->resolved_until = INFINITY;
-  if (r->s->sources == 0) return PW_OK;
+  if (r->s->sources == 0 && r->settings.integrals == 0) return PW_OK;
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int status = pw_resolution_open (r, error);
   if (status == PW_OK) status = pw_sides_open (r, error);

@@ -16,29 +16,17 @@
 
 #define SIDES_SLIDE 1e-9      /* [T] a condition that would return to its root within this time slides along it */
 #define SIDES_DIFFERENCE 1e-6 /* of the step, for rates of switching functions by forward differences */
+#define SIDES_ROUND_OFF 1e-10 /* of conditions of outputs, in their size: the velocity of what sticks has no side */
 
 /* ---- Values ---- */
 
-/* Stores the switching functions at a state. */
-static void sides_evaluate (pw_run *r, double t, const double *q, const double *v, double *beyond) {
-  for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
-    double *state = r->sides->read;
-    if (!pw_source_has_conditions (x)) continue;
-    for (int i = 0; i < x->reads; i++) {
-      const int j = x->state[i];
-      state[i] = j < r->s->coords ? q[j] : v[j - r->s->coords];
-    }
-    beyond += x->signal.function.sides (x->signal.function.context, t, state, beyond);
-  }
-}
-
-/* The same at the state reached, and their rates there. */
+/* The switching functions at the state reached, and their rates there. */
 static void sides_evaluate_rates (pw_run *r, double h, double *beyond, double *rate) {
   const double s = SIDES_DIFFERENCE * h, t = pw_before_breakpoint (r, r->t);
   double *q = r->scratch, *v = q + r->s->coords + 3;
-  sides_evaluate (r, t, r->q, r->v, beyond);
+  pw_run_evaluate_sides (r, t, r->q, r->v, beyond);
   for (int j = 0; j < r->s->coords; j++) q[j] = r->q[j] + s * r->v[j], v[j] = r->v[j] + s * r->a[j];
-  sides_evaluate (r, t + s, q, v, rate);
+  pw_run_evaluate_sides (r, t + s, q, v, rate);
   for (int i = 0; i < r->sides->count; i++) rate[i] = (rate[i] - beyond[i]) / s;
 }
 
@@ -51,9 +39,12 @@ static int sides_at (void *context, double t, double *value, pw_error *error) {
   const int near_singular = r->near_singular, status = r->method->at (r, t, error);
   r->statistics = statistics, r->near_singular = near_singular;
   if (status != PW_OK) return status;
-  sides_evaluate (r, t, r->q_at, r->v_at, value);
+  pw_run_evaluate_sides (r, t, r->q_at, r->v_at, value);
   int beyond = 0;
-  for (int i = 0; i < x->count; i++) beyond |= value[i] > 0;
+  for (int i = 0; i < x->count; i++) {
+    if (x->start[i] == -INFINITY) value[i] = -INFINITY;
+    beyond |= value[i] > 0;
+  }
   if (!beyond || !(t < x->found.t)) return PW_OK;
   x->found.t = t, x->found.projected = r->projected_at;
   memcpy (x->found.q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
@@ -92,11 +83,10 @@ int pw_sides_begin (pw_run *r, pw_error *error) {
   const double T = r->w->scale.time;
   if (!x->fixed) pw_run_fix_sides (r);
   sides_evaluate_rates (r, x->h > 0 ? x->h : 1e-3 * T, x->start, x->start_rate);
-  for (int i = 0; i < x->count; i++) {
+  for (int i = 0; i < x->signals; i++)
     if (x->changed[i] && x->start_rate[i] > 0 && -x->start[i] < SIDES_SLIDE * T * x->start_rate[i])
       return sides_fail (r, i, error);
-    x->changed[i] = 0;
-  }
+  memset (x->changed, 0, (size_t)x->count);
   return PW_OK;
 }
 
@@ -108,6 +98,16 @@ static int sides_far (const pw_sides *x, double h) {
     if (!(fmax (x->start[i], x->end[i]) + bend < 0) && x->start[i] > -INFINITY) return 0;
   }
   return 1;
+}
+
+/* Passes over conditions of outputs that are 0 in the whole step but for errors of the method. */
+static void sides_skip (pw_run *r) {
+  pw_sides *x = r->sides;
+  for (int i = x->signals; i < x->count; i++) {
+    if (isfinite (x->end[i])) x->size[i] = fmax (x->size[i], fabs (x->end[i]));
+    const double small = fmax (SIDES_ROUND_OFF, r->fixed_steps ? 0 : r->settings.rtol) * x->size[i];
+    if (x->start[i] > -small && x->end[i] < small) x->start[i] = x->end[i] = -INFINITY;
+  }
 }
 
 /* Makes the earliest sample beyond a side the state reached, unless that is the end of the step. */
@@ -134,6 +134,7 @@ int pw_sides_follow (pw_run *r, double t0, pw_error *error) {
                                 .error = error };
   x->h = r->t - t0;
   sides_evaluate_rates (r, x->h, x->end, x->end_rate);
+  sides_skip (r);
   if (sides_far (x, x->h)) return PW_OK;
   x->found.t = INFINITY;
   const double root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
@@ -147,23 +148,52 @@ int pw_sides_follow (pw_run *r, double t0, pw_error *error) {
 
 /* ---- Opening ---- */
 
-int pw_sides_open (pw_run *r, pw_error *error) {
-  int count = 0, reads = 0;
-  for (const pw_source *x = r->w->source; x < r->w->source + r->s->sources; x++) {
-    if (!pw_source_has_conditions (x)) continue;
-    count += x->signal.function.sides (x->signal.function.context, 0, NULL, NULL);
-    reads = x->reads > reads ? x->reads : reads;
+/* Adds a function that has conditions, unless there is no room yet; reads: states that it reads. */
+static void sides_add (pw_sides *x, const pw_function *function, int reads, const int *state) {
+  if (x->of)
+    x->of[x->functions] = (pw_source){ { PW_FUNCTION, .function = *function }, .reads = reads, .state = state };
+  x->functions++;
+  x->count += function->sides (function->context, 0, NULL, NULL);
+}
+
+/* Lists the functions that have conditions: signals; with integrals, outputs that are functions of states alone, whose
+ * indices are stored in `state` unless it is NULL. */
+static void sides_list (pw_run *r, pw_sides *x, int *state) {
+  const pw_compiled_output *o = r->w->output;
+  x->functions = x->count = 0;
+  for (const pw_source *of = r->w->source; of < r->w->source + r->s->sources; of++)
+    if (pw_source_has_conditions (of)) sides_add (x, &of->signal.function, of->reads, of->state);
+  x->signals = x->count;
+  for (; r->settings.integrals > 0 && o < r->w->output + r->s->outputs; o++) {
+    if (!o->function.sides || o->types != 1u << PW_COLUMN_STATE) continue;
+    for (int k = 0; state && k < o->reads; k++) state[k] = o->read[k].index;
+    sides_add (x, &o->function, o->reads, state);
+    if (state) state += o->reads;
   }
-  if (count == 0) return PW_OK;
-  pw_sides *x = r->sides = pw_arena_alloc (&r->arena, sizeof *x);
+}
+
+int pw_sides_open (pw_run *r, pw_error *error) {
   const size_t states = pw_state_length (r->s);
-  if (x) x->count = count;
+  pw_sides list = { 0 }, *x;
+  int *state;
+  sides_list (r, &list, NULL);
+  const int count = list.count, reads = PW_OUTPUT_READS + 2 * r->s->coords;
+  if (count == 0) return PW_OK;
+  x = r->sides = pw_arena_alloc (&r->arena, sizeof *x);
   if (x == NULL ||
       !PW_ARENA_ARRAYS (&r->arena, PW_ARRAY (x->start, count), PW_ARRAY (x->end, count),
                         PW_ARRAY (x->start_rate, count), PW_ARRAY (x->end_rate, count), PW_ARRAY (x->now, count),
-                        PW_ARRAY (x->memory, (PW_CROSSING_DEPTH + 2) * count), PW_ARRAY (x->read, reads),
-                        PW_ARRAY (x->state, 2 * r->s->coords), PW_ARRAY (x->found.q, states),
-                        PW_ARRAY (x->found.ledger, r->entries), PW_ARRAY (x->changed, count)))
+                        PW_ARRAY (x->size, count), PW_ARRAY (x->memory, (PW_CROSSING_DEPTH + 2) * count),
+                        PW_ARRAY (x->read, reads), PW_ARRAY (x->state, 2 * r->s->coords), PW_ARRAY (x->found.q, states),
+                        PW_ARRAY (x->found.ledger, r->entries), PW_ARRAY (x->of, list.functions),
+                        PW_ARRAY (state, PW_OUTPUT_READS * list.functions), PW_ARRAY (x->changed, count)))
     return r->sides = NULL, pw_fail_memory (r->s, error);
+  sides_list (r, x, state);
+  double *q = r->scratch, *v = q + r->s->coords;
+  for (int j = 0; j < r->s->coords; j++) q[j] = r->q[j] + pw_unit (r->s, j), v[j] = pw_velocity_unit (r, j, 0);
+  pw_run_evaluate_sides (r, r->t, q, v, NULL);
+  pw_run_evaluate_sides (r, r->t, q, v, x->size);
+  for (int i = 0; i < count; i++) x->size[i] = isfinite (x->size[i]) ? fabs (x->size[i]) : 0;
+  pw_run_free_sides (r);
   return PW_OK;
 }

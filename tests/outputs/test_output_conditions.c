@@ -1,0 +1,65 @@
+/* Integrals of outputs that jump or have kinks where states pass a value: closed forms. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* x = cos t; a block that friction stops at t = 1, on a slope so that its velocity at rest is round-off. */
+static const char model[] =
+    "pinwheel: 1\n"
+    "bodies:\n"
+    "  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\n"
+    "  - {name: b, mass: 1, inertia: 1, rate: {vx: 0.6, vy: 0.8}}\n"
+    "elements:\n"
+    "  - {spring: k, body: [a, ground], at: [[0, 0], [-10, 0]], stiffness: 1, length: 10}\n"
+    "  - {slider: slope, body: [b, ground], at: [[0, 0], [0, 0]], heading: atan (4.0/3)}\n"
+    "  - {sliding-friction: f, body: [b, ground], at: [[0, 0], [0, 0]], heading: atan (4.0/3), limit: 1}\n"
+    "outputs:\n"
+    "  - {name: beyond, value: 'a.x > 0.3 ? 1 : 0'}\n"
+    "  - {name: side, value: 'sign (a.x - 0.3)'}\n"
+    "  - {name: cut, value: 'max (a.x, 0.3)'}\n"
+    "  - {name: both, value: 'beyond + cut'}\n"
+    "  - {name: path, value: 'abs (b.vx)'}\n"
+    "  - {name: slides, value: 'b.vx > 1e-6 ? 1 : 0'}\n";
+
+const check_fixture fixture = { cli_setup_undrawn, cli_teardown };
+
+/* The number after a name in the output of the last command. */
+static double conditions_printed (const char *name) {
+  const char *found = strstr (cli_out, name);
+  assert_non_null (found);
+  return atof (found + strlen (name));
+}
+
+/* Steps end where conditions change, and while the block rests its velocity changes no side. */
+TEST (closed_forms) {
+  static const struct {
+    const char *method;
+    int fixed;
+    double bound, steps;
+    const char *reason;
+  } of[] = { { "rk4+projection", 1, 5e-8, 1020, "8 digits are printed" },
+             { "erk5+projection", 0, 1e-6, 180, "tens of steps" },
+             { "erk8+projection", 0, 5e-8, 80, "8 digits are printed" },
+             { "radau+ggl", 0, 1e-6, 160, "its own tolerance" },
+             { "ida+ggl", 0, 1e-5, 400, "hundreds of steps" },
+             { "adams+none", 0, 1e-5, 350, "hundreds of steps" },
+             { "galpha+ggl", 1, 2e-4, 1020, "h^2" } };
+  const double t = acos (0.3), beyond = 3 * t, cut = 3 + 3 * (sin (t) - 0.3 * t); /* x is beyond 0.3 for 3 t */
+  const double expected[] = { beyond, 2 * beyond - 10, cut, beyond + cut, 0.3, 1 - 1e-6 / 0.6 };
+  static const char *const text[] = { "integral:beyond", "integral:side", "integral:cut",
+                                      "integral:both",   "integral:path", "integral:slides" };
+  cli_write ("conditions.yaml", model);
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+    cli_good (check_text ("pinwheel run @/conditions.yaml -t 10 -m %s --%s --json @/run.json --of integral:beyond --of "
+                          "integral:side --of integral:cut --of integral:both --of integral:path --of integral:slides",
+                          of[i].method, of[i].fixed ? "step 1e-2" : "rtol 1e-8"));
+    const double steps = cli_number (cli_file ("run.json"), "statistics", "steps", NULL) +
+                         cli_number (cli_file ("run.json"), "statistics", "rejected", NULL);
+    for (int k = 0; k < 6; k++)
+      check_close (check_text ("%s, %s", of[i].method, text[k]), conditions_printed (text[k]), expected[k], of[i].bound,
+                   of[i].reason);
+    check_below (of[i].method, steps, of[i].steps, "of smooth integrands");
+  }
+}
