@@ -87,7 +87,8 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
     if (pw_mode_depends (x, i))
       value[2 * i + (limit->circle == 1)] = fabs (x->u[i]) / x->unit[i] - EVENTS_PARTED - tolerance / 10;
     if (x->mode[i] == 0 || limit->circle == 2 || pw_mode_apart (x, i) || (x->still[i] && !limit->circle)) continue;
-    value[2 * i] = -u / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
+    const double armed = x->row[i] < r->s->holonomic ? 0 : EVENTS_ROUND_OFF; /* bodies that sink in gain energy */
+    value[2 * i] = -u / x->unit[i] - (x->armed[i] ? armed : tolerance + x->offset[i]);
     value[2 * i + 1] = -1;
     if (x->still[i] && x->armed[i]) /* of a circle whose first u others keep at 0: u passes beside 0 */
       value[2 * i + 1] = PW_MODES_SMALL / 2 - hypot (x->u[i], x->u[i + 1]) / x->unit[i];
