@@ -188,6 +188,17 @@ static const double woodpecker_event[] = {
   0.559324382066986698, 0.605483970877928650
 };
 
+/* What happens at each of these times, in turn: the first event, and of impacts the sign of the sliding velocity. */
+static const struct {
+  const char *row, *mode;
+  int slip;
+} woodpecker_kind[] = { { "linear lower", "sticks", 0 }, { "linear lower", "slides-", 0 },
+                        { "linear lower", "free", 0 },   { "linear upper", "free", -1 },
+                        { "linear beak", "free", 1 },    { "linear upper", "holds", 1 },
+                        { "linear upper", "free", 0 },   { "linear lower", "free", -1 },
+                        { "linear lower", "holds", -1 } };
+enum { WOODPECKER_KINDS = sizeof woodpecker_kind / sizeof *woodpecker_kind };
+
 static const struct {
   double t, value[6]; /* y, phi of M, phi of S, and their rates */
 } woodpecker_state[] = {
@@ -202,21 +213,45 @@ static const struct {
       -9.52037990656143629 } },
 };
 
-/* The distinct times of the events of a run after its beginning. */
-static int contacts_times (const pw_run *r, double *time, int most) {
+/* The i-th event after the beginning is what it should be. */
+static void woodpecker_check (const pw_system *s, const pw_event *event, int i) {
+  const int kind = i % WOODPECKER_KINDS, slip = woodpecker_kind[kind].slip;
+  char row[50];
+  assert_string_equal (pw_system_row_name (s, event->row, row, sizeof row), woodpecker_kind[kind].row);
+  assert_string_equal (pw_system_mode_name (s, event->row, event->to), woodpecker_kind[kind].mode);
+  assert_int_equal (event->impact, slip != 0);
+  if (slip) assert_true (event[1].impulse * slip < 0); /* of friction */
+}
+
+/* The events of a run after its beginning, the first one at each time; returns their number. */
+static int woodpecker_events (const pw_system *s, const pw_run *r, double *time, int most) {
   int count, n = 0;
   const pw_event *event = pw_run_events (r, &count);
-  for (int i = 0; i < count; i++)
-    if (event[i].t > 1e-9 && n < most && (n == 0 || event[i].t > time[n - 1] + 1e-9)) time[n++] = event[i].t;
+  for (int i = 0; i < count; i++) {
+    if (event[i].t < 1e-9 || n == most || (n > 0 && event[i].t < time[n - 1] + 1e-9)) continue;
+    woodpecker_check (s, event + i, n);
+    time[n++] = event[i].t;
+  }
   return n;
+}
+
+/* Numbers compared with the 69 of the toy: start, times of events, states, cycle. */
+static int woodpecker_compared;
+
+static void woodpecker_start (const pw_system *s, const pw_run *r) {
+  static const char *const mode[] = { "free", "holds", "free", "slides+", "slides-", "slides+" };
+  for (int row = 1; row < pw_system_rows (s); row++) /* beak, lower, upper; their friction; where free, it has none */
+    assert_string_equal (pw_system_mode_name (s, row, pw_run_mode (r, row)), mode[row - 1]);
 }
 
 static double woodpecker_run (const char *method, double step, double rtol, double bound, const char *reason) {
   enum { COUNT = sizeof woodpecker_event / sizeof *woodpecker_event, STATES = 3 };
   static const int of[6] = { 1, 2, 5, 1, 2, 5 };
   double time[COUNT + 10], most = 0;
+  int count;
   pw_system *s = scene_system (&woodpecker_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = rtol, .span = 0.606, .ledger = 1 });
+  woodpecker_start (s, r);
   for (int i = 0; i < STATES; i++) {
     const pw_sample x = runs_to (r, woodpecker_state[i].t);
     for (int k = 0; k < 6; k++)
@@ -225,13 +260,14 @@ static double woodpecker_run (const char *method, double step, double rtol, doub
     check_close (check_text ("%s, balance", method), x.balance / x.kinetic, 0, 1e4 * bound, "losses are counted");
   }
   (void)runs_to (r, 0.606);
-  const int count = contacts_times (r, time, COUNT + 10);
+  count = woodpecker_events (s, r, time, COUNT + 10);
   if (count != COUNT) print_error ("%s: %d events\n", method, count);
   for (int i = 0; i < COUNT && i < count; i++) {
     check_close (check_text ("%s, event %d", method, i + 1), time[i], woodpecker_event[i], bound, reason);
     most = fmax (most, fabs (time[i] - woodpecker_event[i]));
   }
   assert_int_equal (count, COUNT);
+  woodpecker_compared = 1 + STATES * 6 + COUNT;
   runs_close (r, s);
   return most;
 }
@@ -239,6 +275,47 @@ static double woodpecker_run (const char *method, double step, double rtol, doub
 TEST (woodpecker_to_round_off) {
   woodpecker_run ("erk8+projection", 0, 1e-12, 1e-11, "10 rtol: impacts amplify errors");
   woodpecker_run ("radau+ggl", 0, 1e-12, 1e-11, "10 rtol: impacts amplify errors");
+}
+
+/* The periodic motion that it approaches: the distance from it shrinks by a factor of about 0.84 in each cycle. */
+TEST (woodpecker_cycle) {
+  static const double time[] = { 0,
+                                 0.0058207572348098022545,
+                                 0.016709825280643503296,
+                                 0.019811178939636432686,
+                                 0.020390700477988666383,
+                                 0.022245391272032776592,
+                                 0.057533801960158213397,
+                                 0.060262535991420886919,
+                                 0.10638265814428988435,
+                                 0.14597606514375182353 };
+  static const double state[] = { 0.019445379284716526658, -0.20513534924352575665, 17.574666205576077863 };
+  enum { CYCLES = 130, TIMES = sizeof time / sizeof *time, MOST = (CYCLES + 1) * WOODPECKER_KINDS };
+  static double at[MOST];
+  double now[3], before = 0;
+  pw_error error = { 0 };
+  pw_sample x;
+  pw_system *s = scene_system (&woodpecker_table, NULL);
+  pw_run *r = runs_open (s, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = CYCLES * 0.146 });
+  int known = 0, slips = 0, all;
+  while (slips < CYCLES) {
+    check_ok (pw_run_advance (r, CYCLES, &error), &error);
+    const pw_event *event = pw_run_events (r, &all);
+    if (all == known || event[all - 1].from || !event[all - 1].to || event[all - 1].row != event[1].row) continue;
+    known = all, slips++; /* the lower contact, which has stuck, begins to slide */
+    check_ok (pw_run_sample (r, event[all - 1].t, &x, &error), &error);
+    now[0] = before - x.q[1], now[1] = x.q[5], now[2] = x.v[5];
+    before = x.q[1];
+  }
+  const int count = woodpecker_events (s, r, at, MOST);
+  for (int i = 0; i < TIMES; i++)
+    check_close (check_text ("cycle, event %d", i), at[count - TIMES + i] - at[count - TIMES], time[i], 1e-11,
+                 "impacts amplify errors");
+  check_close ("drop", now[0], state[0], 1e-11, "the same");
+  check_close ("phi", now[1], state[1], 1e-12, "it follows from the friction there");
+  check_close ("omega", now[2], state[2], 2e-10, "accelerations of 1e3 rad/s^2");
+  assert_int_equal (woodpecker_compared + TIMES + 3, 69);
+  runs_close (r, s);
 }
 
 /* All methods but leapfrog and moreau, which refuse. */

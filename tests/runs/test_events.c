@@ -10,48 +10,244 @@
 #include "runs.h"
 #include "scene.h"
 
-enum { EVENTS_MOST = 64, EVENTS_STATES = 10 };
+/* ---- The numbers of tests/runs/events.txt ---- */
 
-/* A problem of tests/runs/events.txt. */
+enum { EVENTS_MOST = 64, EVENTS_NUMBERS = 50, EVENTS_INTEGRALS = 2 };
+
 typedef struct {
-  char scene[40], sets[80];
-  double t_end, time[EVENTS_MOST], value[EVENTS_STATES], loss; /* loss: NaN if not given */
-  int events, states;
-  char state[EVENTS_STATES][30];
+  char where[10], name[30]; /* "at", "before", ...; a column, or "t" of a crossing */
+  double at, value;         /* the time, the number of the event or of the crossing */
+} events_number;
+
+typedef struct {
+  char scene[40], sets[80], crossing[30], after[EVENTS_MOST][10]; /* after: sign or element, or "" */
+  double t_end, last, growth, time[EVENTS_MOST];                  /* last: NaN if not given */
+  int events, numbers, crossings;
+  events_number number[EVENTS_NUMBERS];
 } events_problem;
 
-static events_problem events_problems[40];
+static events_problem events_problems[45];
 static int events_count;
 
+/* Sets of numbers, and their sizes.  Of the rocking block, 10, four more are in test_housner; 69 of the woodpecker toy
+ * are in test_contacts.c. */
+static struct {
+  const char *name;
+  int size, read;
+} events_set[] = { { "1a", 11, 0 }, { "1b", 27, 0 },  { "2a", 6, 0 },  { "2b", 4, 0 },  { "2c", 8, 0 },
+                   { "2d", 17, 0 }, { "3a", 48, 0 },  { "3b", 17, 0 }, { "4", 18, 0 },  { "5", 25, 0 },
+                   { "6a", 28, 0 }, { "6b", 33, 0 },  { "6c", 27, 0 }, { "7a", 41, 0 }, { "7b", 82, 0 },
+                   { "7c", 93, 0 }, { "7d", 133, 0 }, { "8a", 8, 0 },  { "8b", 5, 0 },  { "8c", 12, 0 },
+                   { "9", 12, 0 },  { "9b", 22, 0 },  { "10", 21, 0 }, { "12", 19, 0 }, { "13", 13, 0 },
+                   { "14a", 9, 0 }, { "14b", 10, 0 }, { "-", 147, 0 } };
+enum { EVENTS_SETS = sizeof events_set / sizeof *events_set - 1 }; /* the last: numbers of no set */
+
+static void events_add (events_problem *p, const char *where, double at, const char *name, double value, int *read) {
+  events_number *n = &p->number[p->numbers++];
+  assert_true (p->numbers <= EVENTS_NUMBERS);
+  snprintf (n->where, sizeof n->where, "%s", where);
+  snprintf (n->name, sizeof n->name, "%s", name);
+  n->at = at, n->value = value;
+  ++*read;
+}
+
+/* The numbers of a line: read counts them. */
+static void events_read_line (events_problem *p, char *line, int *read) {
+  const char *where = strtok (line, " \n"), *name = strcmp (where, "crossing") == 0 ? strtok (NULL, " \n") : NULL;
+  double at = strtod (strtok (NULL, " \n"), NULL);
+  if (strcmp (where, "event") == 0) {
+    const char *after = strtok (NULL, " \n");
+    p->time[p->events] = at;
+    snprintf (p->after[p->events++], sizeof *p->after, "%s", after ? after : "");
+    *read += after ? 2 : 1;
+    return;
+  }
+  if (strcmp (where, "last") == 0) p->last = at, ++*read;
+  if (strcmp (where, "growth") == 0) p->growth = at;
+  if (name) {
+    const double t = at;
+    snprintf (p->crossing, sizeof p->crossing, "%s", name);
+    at = ++p->crossings;
+    if (!isnan (t)) events_add (p, where, at, "t", t, read);
+  }
+  while ((name = strtok (NULL, " \n"))) events_add (p, where, at, name, strtod (strtok (NULL, " \n"), NULL), read);
+}
+
 static int events_read (void) {
-  char line[200];
+  char line[200], name[4];
   FILE *f = fopen ("tests/runs/events.txt", "r");
   assert_non_null (f);
+  int set = EVENTS_SETS;
   while (fgets (line, sizeof line, f)) {
-    events_problem *p = &events_problems[events_count > 0 ? events_count - 1 : 0];
     if (line[0] == '#') continue;
-    if (strncmp (line, "problem", 7) == 0) {
-      p = &events_problems[events_count++];
-      p->loss = NAN;
+    if (sscanf (line, "set %3s", name) == 1)
+      for (set = 0; strcmp (events_set[set].name, name) != 0; set++) assert_in_range (set, 0, EVENTS_SETS - 1);
+    else if (strncmp (line, "problem", 7) == 0) {
+      events_problem *p = &events_problems[events_count++];
+      p->last = NAN, p->growth = 1;
+      set = EVENTS_SETS;
       assert_true (sscanf (line, "problem %39s %lf %79[^\n]", p->scene, &p->t_end, p->sets) >= 2);
-    } else if (strncmp (line, "state", 5) == 0) {
-      assert_int_equal (sscanf (line, "state %29s %lf", p->state[p->states], &p->value[p->states]), 2);
-      p->states++;
-    } else if (sscanf (line, "event %lf", &p->time[p->events]) == 1)
-      p->events++;
-    else
-      assert_int_equal (sscanf (line, "loss %lf", &p->loss), 1);
+    } else
+      events_read_line (&events_problems[events_count - 1], line, &events_set[set].read);
   }
   fclose (f);
-  assert_int_equal (events_count, 38);
   return 0;
 }
 
-/* Impacts of the balls accumulate; only the first ones are compared. */
-static int events_compared (const events_problem *p, const pw_event *event, int count) {
-  const int ball = strcmp (p->scene, "ball") == 0 || strcmp (p->scene, "table") == 0;
-  while (ball && count > 0 && event[count - 1].t > p->time[p->events - 1] + 1e-3) count--;
-  return count;
+/* Nothing is missing in the file. */
+TEST (numbers) {
+  int total = 69 + 4;
+  for (int i = 0; i < EVENTS_SETS; i++) {
+    if (events_set[i].read != events_set[i].size) print_error ("set %s\n", events_set[i].name);
+    assert_int_equal (events_set[i].read, events_set[i].size);
+    total += events_set[i].size;
+  }
+  assert_int_equal (total, 822);
+  assert_int_equal (events_set[EVENTS_SETS].read, events_set[EVENTS_SETS].size);
+}
+
+/* A run whose numbers are compared. */
+typedef struct {
+  const events_problem *p;
+  const char *method, *reason;
+  double bound, most; /* of times, ten times it of others; the largest error of a time */
+  pw_system *s;
+  pw_run *r;
+  pw_workspace *w;
+  pw_column column[EVENTS_NUMBERS], crossed; /* crossed: that whose crossings are sought */
+  double before[EVENTS_NUMBERS];             /* values at the end of the last step */
+  pw_crossing crossing;
+  int events, crossings, compared, positive, integrals, integral[EVENTS_INTEGRALS]; /* integral: outputs */
+  double since;                                                                     /* the last crossing */
+} events_check;
+
+static double events_column (events_check *c, const pw_sample *x, pw_column column) {
+  double value;
+  pw_error error = { 0 };
+  check_ok (pw_workspace_columns (c->w, x, &column, 1, &value, &error), &error);
+  return value;
+}
+
+static void events_compare (events_check *c, int i, double value) {
+  const events_number *n = &c->p->number[i];
+  const int is_time = strcmp (n->name, "t") == 0 || strcmp (n->name, "period") == 0;
+  check_close (check_text ("%s, %s %s, %s %g %s", c->method, c->p->scene, c->p->sets, n->where, n->at, n->name), value,
+               n->value, (is_time ? 1 : 10) * c->bound, is_time ? c->reason : "velocities between events");
+  c->compared++;
+}
+
+/* The numbers of a place, of which this is the sample. */
+static void events_compare_at (events_check *c, const char *where, double at, double t) {
+  pw_sample x;
+  pw_error error = { 0 };
+  int count;
+  const pw_event *event = pw_run_events (c->r, &count);
+  for (int i = 0; i < c->p->numbers; i++) {
+    const events_number *n = &c->p->number[i];
+    if (strcmp (n->where, where) != 0 || n->at != at) continue;
+    check_ok (pw_run_sample (c->r, t, &x, &error), &error);
+    double value;
+    if (strcmp (n->name, "events") == 0)
+      value = count;
+    else if (strcmp (n->name, "holds") == 0)
+      value = pw_run_mode (c->r, event[count - 1].row) == 0;
+    else if (strcmp (n->name, "impulse") == 0)
+      value = fabs (event[(int)at - 1].impulse);
+    else if (strcmp (n->name, "t") == 0)
+      value = t;
+    else if (strcmp (n->name, "period") == 0)
+      value = t - c->since;
+    else if (strncmp (n->name, "integral:", 9) == 0)
+      value = x.integral[c->column[i].index];
+    else if (strcmp (n->where, "before") == 0)
+      value = c->before[i];
+    else
+      value = events_column (c, &x, c->column[i]) / (strcmp (n->where, "ratio") == 0 ? c->before[i] : 1);
+    events_compare (c, i, value);
+  }
+}
+
+/* An event that the last step begins with; k from 0. */
+static void events_event (events_check *c, const pw_event *event, int k) {
+  const events_problem *p = c->p;
+  char row[100];
+  if (k >= p->events) return;
+  const char *what = check_text ("%s, %s %s, event %d", c->method, p->scene, p->sets, k + 1), *after = p->after[k];
+  check_close (what, event->t, p->time[k], c->bound, c->reason);
+  c->most = fmax (c->most, fabs (event->t - p->time[k]));
+  (void)pw_system_row_name (c->s, event->row, row, sizeof row);
+  const char *mode = pw_system_mode_name (c->s, event->row, event->to);
+  if (strcmp (after, "1") == 0 || strcmp (after, "-1") == 0) {
+    if (!strchr (mode, *after == '1' ? '+' : '-')) print_error ("%s: %s\n", what, mode);
+    assert_non_null (strchr (mode, *after == '1' ? '+' : '-'));
+  } else
+    assert_non_null (strstr (row, after));
+  events_compare_at (c, "before", k + 1, event->t);
+  events_compare_at (c, "after", k + 1, event->t);
+  events_compare_at (c, "ratio", k + 1, event->t);
+}
+
+static double events_crossed (void *context, const pw_sample *x) {
+  events_check *c = context;
+  return events_column (c, x, c->crossed);
+}
+
+/* After a step, or before the first one. */
+static void events_step (events_check *c) {
+  pw_sample x = { .t = NAN };
+  pw_error error = { 0 };
+  int count;
+  const pw_event *event = pw_run_events (c->r, &count);
+  for (; c->events < count; c->events++) events_event (c, &event[c->events], c->events);
+  for (int i = 0; i < c->p->numbers; i++) {
+    const char *where = c->p->number[i].where;
+    if ((*where != 'b' && *where != 'r') || c->p->number[i].at != count + 1) continue;
+    if (isnan (x.t)) check_ok (pw_run_sample (c->r, pw_run_time (c->r), &x, &error), &error);
+    c->before[i] = events_column (c, &x, c->column[i]);
+  }
+  if (c->crossings == c->p->crossings) return;
+  if (c->positive) {
+    check_ok (pw_run_sample (c->r, pw_run_time (c->r), &x, &error), &error);
+    if (events_crossed (c, &x) > 0) return;
+    c->positive = c->crossing.begun = 0;
+  }
+  double t;
+  check_ok (pw_run_find_crossing (c->r, &c->crossing, &t, &error), &error);
+  if (isnan (t)) return;
+  events_compare_at (c, "crossing", ++c->crossings, t);
+  c->since = t, c->positive = 1;
+}
+
+static void events_advance (events_check *c, double t) {
+  pw_error error = { 0 };
+  while (pw_run_time (c->r) < t) {
+    check_ok (pw_run_advance (c->r, t, &error), &error);
+    events_step (c);
+  }
+}
+
+static void events_integrand (void *context, const pw_sample *x, double *value) {
+  const events_check *c = context;
+  for (int i = 0; i < c->integrals; i++) value[i] = x->output[c->integral[i]];
+}
+
+/* Finds the columns, and the outputs whose integrals are compared. */
+static void events_columns (events_check *c) {
+  static const char *const others[] = { "t", "events", "holds", "impulse", "period" };
+  pw_error error = { 0 };
+  for (int i = 0; i < c->p->numbers; i++) {
+    const char *name = c->p->number[i].name;
+    int known = 0;
+    for (size_t k = 0; k < sizeof others / sizeof *others; k++) known |= strcmp (name, others[k]) == 0;
+    if (known) continue;
+    const int integral = strncmp (name, "integral:", 9) == 0;
+    check_ok (pw_system_find_column (c->s, name + (integral ? 9 : 0), &c->column[i], &error), &error);
+    if (!integral) continue;
+    assert_in_range (c->integrals, 0, EVENTS_INTEGRALS - 1);
+    c->integral[c->integrals] = c->column[i].index;
+    c->column[i].index = c->integrals++;
+  }
+  if (c->p->crossings > 0) check_ok (pw_system_find_column (c->s, c->p->crossing, &c->crossed, &error), &error);
 }
 
 /* 1 for contacts with friction. */
@@ -59,41 +255,43 @@ static int events_rubs (const events_problem *p) {
   return strcmp (p->scene, "rolling") == 0 || strcmp (p->scene, "rocking") == 0 || strcmp (p->scene, "zero") == 0;
 }
 
-/* Runs a problem; returns the largest error of the times of its events, and checks the rest. */
+/* Runs a problem, and compares its numbers; returns the largest error of the times of its events. */
 static double events_run (const events_problem *p, const char *method, const pw_settings *settings, double bound,
                           const char *reason) {
-  pw_system *s = runs_scene (p->scene, p->sets);
+  pw_error error = { 0 };
+  events_check c = { .p = p, .method = method, .reason = reason, .bound = bound * p->growth };
+  c.s = runs_scene (p->scene, p->sets), c.w = pw_workspace_new (c.s, &error);
+  events_columns (&c);
   pw_settings set = *settings;
   set.span = p->t_end, set.ledger = 1;
-  pw_run *r = runs_open (s, method, &set);
-  pw_sample x = runs_to (r, p->t_end);
+  set.integrals = c.integrals, set.integrand = events_integrand, set.integrand_context = &c;
+  c.r = runs_open (c.s, method, &set);
+  c.crossing.value = events_crossed, c.crossing.context = &c;
+  events_step (&c);
+  for (int i = 0; i < p->numbers; i++) {
+    const events_number *n = &p->number[i];
+    if (strcmp (n->where, "at") != 0 || (i > 0 && n[-1].at == n->at && strcmp (n[-1].where, "at") == 0)) continue;
+    events_advance (&c, n->at);
+    events_compare_at (&c, "at", n->at, n->at);
+  }
+  events_advance (&c, p->t_end);
+  const char *what = check_text ("%s, %s %s", method, p->scene, p->sets);
+  const double rest = (events_rubs (p) ? 100 : 10) * sqrt (set.rtol > 0 ? 10 * set.rtol : 1e-13);
   int count;
-  double most = 0;
-  const pw_event *event = pw_run_events (r, &count);
-  count = events_compared (p, event, count);
-  char what[150];
-  snprintf (what, sizeof what, "%s, %s %s", method, p->scene, p->sets);
+  const pw_event *event = pw_run_events (c.r, &count);
+  if (!isnan (p->last)) {
+    check_close (check_text ("%s, last event", what), event[count - 1].t, p->last, bound + rest,
+                 "the rest of the series, as many times the shortest motion that is resolved");
+    while (event[count - 1].t > p->time[p->events - 1] + 1e-3) count--;
+  }
   if (count != p->events) print_error ("%s: %d events\n", what, count);
   assert_int_equal (count, p->events);
-  for (int i = 0; i < count; i++) {
-    check_close (check_text ("%s, event %d", what, i), event[i].t, p->time[i], bound, reason);
-    most = fmax (most, fabs (event[i].t - p->time[i]));
-  }
-  for (int i = 0; i < p->states; i++) {
-    pw_column c;
-    double value;
-    pw_error error = { 0 };
-    pw_workspace *w = pw_workspace_new (s, &error);
-    check_ok (pw_system_find_column (s, p->state[i], &c, &error), &error);
-    check_ok (pw_workspace_columns (w, &x, &c, 1, &value, &error), &error);
-    check_close (check_text ("%s, %s", what, p->state[i]), value, p->value[i], 50 * bound, "velocities between events");
-    pw_workspace_free (w);
-  }
-  if (!isnan (p->loss)) check_close (check_text ("%s, loss", what), x.loss, p->loss, 50 * bound, "as states");
-  check_close (check_text ("%s, balance", what), x.balance, 0, 200 * bound,
+  assert_int_equal (c.compared, p->numbers);
+  check_close (check_text ("%s, balance", what), runs_to (c.r, p->t_end).balance, 0, 200 * bound,
                "losses by sliding and impacts are counted");
-  runs_close (r, s);
-  return most;
+  pw_workspace_free (c.w);
+  runs_close (c.r, c.s);
+  return c.most;
 }
 
 static void events_all (const char *method, double step, double rtol, double bound, const char *reason) {
@@ -113,7 +311,8 @@ TEST (to_round_off) {
   events_all ("erk8+projection", 0, 1e-12, 5e-12, "5 rtol");
 }
 
-/* The first of each scene; all methods but moreau, which locates no events (test_moreau.c). */
+/* The first of each scene, and those whose impacts accumulate; all methods but moreau, which locates no events
+ * (test_moreau.c). */
 TEST (all_methods) {
   char method[40];
   for (int i = 0; runs_method (i, method); i++) {
@@ -124,11 +323,49 @@ TEST (all_methods) {
     for (int k = 0; k < events_count; k++) {
       const events_problem *p = &events_problems[k];
       if (strncmp (method, "leapfrog", 8) == 0 && events_rubs (p)) continue; /* which it refuses */
-      if (k > 0 && strcmp (p->scene, p[-1].scene) == 0) continue;
-      events_run (p, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10 }, bound,
+      if (k > 0 && strcmp (p->scene, p[-1].scene) == 0 && isnan (p->last)) continue;
+      events_run (p, method, &(pw_settings){ .step = 1e-3, .rtol = fixed ? 0 : 1e-10 }, bound,
                   second ? "(h k)^2, more where it drifts" : "errors of the method, 1e4 rtol of multistep ones");
     }
   }
+}
+
+/* Of the rocking block the tilt in balance, the rate p at which it departs from there, and the formulas of Housner
+ * (1963, Bulletin of the Seismological Society of America 53, 403-417) for small angles, with the ratio of the rates in
+ * an impact. */
+TEST (housner) {
+  const double digits[] = { 0.19739555984988075837, 3.7985845578046423355, 0.55417846707903372080,
+                            0.052592168828495772927 };
+  double tilt[3] = { 0.19, 0.2, 0 }, a[2] = { 0, 0 }, p = 0, ratio = 0;
+  pw_error error = { 0 };
+  for (int i = 0; i < 7; i++) { /* the acceleration there is 0: secants */
+    pw_system *s = runs_scene ("rocking", check_text ("tilt=%.17g", i < 2 ? tilt[i] : tilt[2]));
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    if (i >= 2) tilt[0] = tilt[1], tilt[1] = tilt[2], a[0] = a[1];
+    a[i > 0] = runs_to (r, 0).a[2];
+    if (i > 0 && a[1] != a[0]) tilt[2] = tilt[1] - a[1] * (tilt[1] - tilt[0]) / (a[1] - a[0]);
+    pw_linear l = { 0 };
+    if (i == 6) check_ok (pw_run_linearise (r, 10, &l, &error), &error), p = l.re[0];
+    pw_linear_free (&l);
+    runs_close (r, s);
+  }
+  pw_system *s = runs_scene ("rocking", "");
+  pw_run *r = runs_open (s, "erk8", &(pw_settings){ .rtol = 1e-12 });
+  for (int count = 0; count < 2; (void)pw_run_events (r, &count)) {
+    ratio = runs_to (r, pw_run_time (r)).v[2];
+    check_ok (pw_run_advance (r, 1, &error), &error);
+  }
+  pw_sample x;
+  int count;
+  check_ok (pw_run_sample (r, pw_run_events (r, &count)[1].t, &x, &error), &error);
+  ratio = x.v[2] / ratio;
+  runs_close (r, s);
+  const double alpha = tilt[2], rest = 1 - 0.15 / alpha;
+  check_close ("tilt in balance", alpha, digits[0], 1e-14, "round-off");
+  check_close ("p", p, digits[1], 1e-13, "round-off");
+  check_close ("first impact", acosh (1 / rest) / p, digits[2], 1e-12, "round-off");
+  check_close ("tilt after six impacts", alpha * (1 - sqrt (1 - pow (ratio, 12) * (1 - rest * rest))), digits[3], 1e-13,
+               "round-off");
 }
 
 /* Errors of the times at three step sizes have the order of the method. */
