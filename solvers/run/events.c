@@ -58,21 +58,22 @@ static int events_allocate (pw_run *r) {
 
 /* ---- Event functions, positive beyond an event: two for each equation ---- */
 
-/* Below this u [units] is 0 after its root: the error of the method, in index 3 round-off of positions over a step. */
-static double events_tolerance (const pw_run *r) {
+/* Below this u [units] of equation i is 0 after its root: the error of the method, in index 3 that of velocities by the
+ * round-off of positions over a step. */
+static double events_tolerance (const pw_run *r, int i) {
   const double T = r->w->scale.time, h = r->fixed_steps ? r->settings.step : EVENTS_FIRST * T;
-  const double round_off = pw_stabilised_by (r, PW_INDEX3) ? 1024 * DBL_EPSILON * T / h : 1e-13;
-  return fmax (round_off, r->fixed_steps ? 0 : 10 * r->settings.rtol);
+  const int rounded = pw_stabilised_by (r, PW_INDEX3) && r->events->row[i] >= r->s->holonomic;
+  return fmax (rounded ? 1024 * DBL_EPSILON * T / h : 1e-13, r->fixed_steps ? 0 : 10 * r->settings.rtol);
 }
 
 /* Event functions where J is evaluated, from the multipliers and velocities. */
 static void events_values (pw_run *r, const double *v, const double *lambda, double *value) {
   pw_events *x = r->events;
-  const double tolerance = events_tolerance (r);
   pw_modes_u (r, v, 1, x->u);
   pw_modes_set_limits (r);
   for (int i = 0; i < x->count; i++) {
     const pw_bounds *limit = &x->limit[i];
+    const double tolerance = events_tolerance (r, i);
     double y = lambda[x->row[i]], size = x->partner[i] < 0 ? 1 : fabs (lambda[x->row[x->partner[i]]]);
     value[2 * i] = isinf (limit->most) ? -1 : (y - size * limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
     value[2 * i + 1] = isinf (limit->least) ? -1 : (size * limit->least - y) / x->force_unit[i] - EVENTS_ROUND_OFF;
@@ -147,7 +148,7 @@ static int events_search_at (void *context, double t, double *value, pw_error *e
 static void events_arm (pw_run *r, const double *value) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++)
-    x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r) - x->offset[i];
+    x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r, i) - x->offset[i];
 }
 
 /* Marks the equations at their roots; 1 if there are any. */
@@ -321,7 +322,7 @@ static int events_stop_at (pw_run *r, double t, pw_error *error) {
   events_trigger (r, x->now);
   for (int i = 0; i < x->count; i++) /* velocities that reach 0 together do so within the error of the method */
     x->triggered[i] |= x->mode[i] && x->armed[i] && x->row[i] >= r->s->holonomic && !x->limit[i].circle &&
-                       x->now[2 * i] > -events_tolerance (r);
+                       x->now[2 * i] > -events_tolerance (r, i);
   x->pending = 1, x->start_t = NAN;
   for (int i = 0; i < x->count && !x->fell; i++) x->struck[i] &= x->mode[i] != 0 && !x->armed[i];
   if (t == r->t) return PW_OK;
