@@ -55,13 +55,14 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
                                     double steps) {
   const int requested = lanes > 1;
   pw_error own = { 0 };
-  if (lanes == 0 && steps >= PW_LANES_STEPS) lanes = pw_processor_lanes ();
+  if (lanes == 0 && e->code) lanes = pw_processor_lanes ();
   if (lanes <= 1) return NULL;
   pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */
   const char *reason = engine_lanes_obstacle (e, s, method, r);
   char *text = reason ? NULL : pw_run_source (r, &own);
-  pw_scene_code *code = text ? pw_scene_lanes_open (text, s, lanes, &own) : NULL;
-  const int failed = reason == NULL && code == NULL; /* also by Ctrl-C, which ends the compiler, too */
+  const int wanted = requested || steps >= PW_LANES_STEPS || pw_scene_lanes_cached (text, lanes);
+  pw_scene_code *code = text && wanted ? pw_scene_lanes_open (text, s, lanes, &own) : NULL;
+  const int failed = wanted && reason == NULL && code == NULL; /* also by Ctrl-C, which ends the compiler, too */
   if (failed) reason = own.text;
   if (code && pw_scene_code_lanes (code) == NULL) {
     pw_scene_code_close (code);

@@ -949,6 +949,16 @@ pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int la
   return NULL;
 }
 
+int pw_scene_lanes_cached (const char *text, int lanes) {
+  code_job x = { .lanes = lanes };
+  char notice[PW_PATH + 600];
+  int cached = text && code_options (lanes) && code_source (&x, text, NULL) == PW_OK &&
+               cache_folder (x.folder, notice, sizeof notice);
+  if (cached) code_paths (&x), cached = access (x.object, R_OK) == 0;
+  free (x.source.text);
+  return cached;
+}
+
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error) {
   return pw_scene_lanes_open (text, s, 0, error);
 }

@@ -80,6 +80,8 @@ typedef struct pw_scene_code pw_scene_code;
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
 /* The same for 2, 4 or 8 runs at once (pw_runs_advance), if pw_system_has_lanes. */
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);
+/* 1 if the cache has an object that pw_scene_lanes_open would try first. */
+int pw_scene_lanes_cached (const char *text, int lanes);
 const pw_specialised_lanes *
 pw_scene_code_lanes (const pw_scene_code *c); /* NULL if it is for single runs, or compiled by clang */
 /* The number of runs whose lanes fill a vector register of this processor; 1 if several runs at once are not faster. */

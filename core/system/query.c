@@ -95,11 +95,10 @@ static int query_body_state (const pw_system *s, const char *name, int first, pw
   int b = first;
   while (strncmp (s->body_name[b], name, n) != 0 || s->body_name[b][n])
     if ((b = b + 1 < s->bodies ? b + 1 : 0) == first) return -1;
-  pw_nearest nearest = { .sought = dot + 1 };
-  for (int i = 0; i < 6; i++) {
+  for (int i = 0; i < 6; i++)
     if (strcmp (dot + 1, query_states[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
-    pw_nearest_try (&nearest, query_states[i]);
-  }
+  pw_nearest nearest = { .sought = dot + 1 };
+  for (int i = 0; i < 6; i++) pw_nearest_try (&nearest, query_states[i]);
   nearest.sought = name;
   *near = nearest;
   snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], nearest.best); /* names of states have fewer */
