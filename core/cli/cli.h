@@ -408,10 +408,6 @@ extern const char *const pw_cli_csv[], *const pw_cli_json[], *const pw_cli_table
 /* What to write in place of a number with a unit (pw_number_hint), likewise. */
 #define PW_NUMBER_HINT(text) pw_number_hint (text, (char[PW_HINT]){ 0 }, PW_HINT)
 
-/* The first `size` bytes of a text, at most PW_PART_MOST - 1, likewise. */
-enum { PW_PART_MOST = 200 };
-#define PW_PART(text, size) pw_print_part ((char[PW_PART_MOST]){ 0 }, PW_PART_MOST, text, size)
-
 /* "1 run", "2 runs", likewise. */
 #define PW_COUNTED(count, noun) PW_PRINTED (60, "%ld %s%s", (long)(count), noun, (count) == 1 ? "" : "s")
 

@@ -292,7 +292,7 @@ static int new_command (void *options, pw_error *error) {
                     "\"%s\": a model file's name has at most %d letters, digits, _ and -, does not begin with -, and "
                     "ends in .c or .yaml",
                     path, LONGEST);
-  const char *name = PW_PRINTED (LONGEST + 1, "%.*s", (int)(ending - base), base);
+  const char *name = PW_PART (base, (size_t)(ending - base));
   FILE *f = fopen (path, "wx"); /* never overwrites a file */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
   if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));

@@ -127,7 +127,7 @@ void pw_scope_add_path (pw_scope *s, const char *name, pw_path *path) {
 pw_path *pw_scope_path (const pw_scope *s, const char *name) {
   const size_t n = strcspn (name, ".");
   if (s == NULL || name[n] == 0) return NULL;
-  const int found = pw_names_find (&s->index, PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)n, name));
+  const int found = pw_names_find (&s->index, PW_PART (name, n));
   return found < 0 ? NULL : s->path[found];
 }
 
@@ -286,12 +286,11 @@ static int parser_knows (const parser *p, const char *name) {
 /* Reports an unexpected token after an operand; after a number, says what to write: "2*a", "30*deg". */
 static parser_part parser_no_operator (parser *p) {
   char hint[PW_HINT] = "";
-  const char *number = p->text + p->previous,
-             *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
+  const char *number = p->text + p->previous, *name = PW_PART (p->text + p->at, p->size);
   if (p->type == 'n' && pw_number_size (number) && parser_knows (p, name))
     pw_print (hint, sizeof hint, "; write %.*s*%s", (int)(p->previous_end - p->previous), number, name);
   else if (p->type == 'n' && *pw_number_hint (number, hint, sizeof hint) == 0) /* "10 km/h", else "30deg*a" */
-    pw_number_hint (PW_PRINTED (200, "%.*s", (int)(p->at + p->size - p->previous), number), hint, sizeof hint);
+    pw_number_hint (PW_PART (number, (size_t)(p->at + p->size - p->previous)), hint, sizeof hint);
   return parser_fail (p, p->at, "an operator such as * is missing before \"%c\"%s", p->text[p->at], hint);
 }
 
@@ -309,9 +308,8 @@ static parser_part parser_missing (parser *p) {
   if (p->status != PW_OK) return (parser_part){ 0 };
   if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
   if (p->type == 0 || (p->type == ')' && p->previous_end))
-    return parser_fail (
-        p, p->previous, "something is missing after \"%s\"",
-        PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous));
+    return parser_fail (p, p->previous, "something is missing after \"%s\"",
+                        PW_PART (p->text + p->previous, (size_t)(p->previous_end - p->previous)));
   return parser_fail (p, p->at, "this does not belong here");
 }
 
@@ -407,7 +405,7 @@ static parser_part parser_call (parser *p, int index, pw_path *path) {
 static parser_part parser_path (parser *p, const char *name) {
   const pw_scope *s = p->scope;
   const size_t n = strcspn (name, ".");
-  const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)n, name);
+  const char *owner = PW_PART (name, n);
   char hint[PW_HINT];
   pw_path *path = pw_scope_path (s, name);
   if (pw_expression_find_function (name + n + 1) >= 0)

@@ -146,7 +146,7 @@ static const char *place_direction (const pw_place *p, const pw_kind *kind, cons
 /* A uniform bar between two points: {bar: NAME, from: [x, y], to: [x, y], mass: M}. */
 static int build_bar (pw_reader *r, const pw_node *name, const pw_node *from, const pw_node *to, pw_body *body) {
   double a[2], b[2];
-  const char *label = PW_PRINTED (160, "bar %.60s", body->name);
+  const char *label = PW_JOINED (160, "bar ", body->name);
   if (from == NULL || to == NULL) return read_fail (r, name->at, "%s needs two points, \"from\" and \"to\"", label);
   if (pw_yaml_pair (r, from, label, "numbers, [x, y]", a) != PW_OK ||
       pw_yaml_pair (r, to, label, "numbers, [x, y]", b) != PW_OK)
@@ -172,18 +172,18 @@ static int build_body (pw_reader *r, const pw_node *node) {
   if (name == NULL) return read_fail (r, node->at, "a body needs a name");
   if (pw_build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
   for (int i = 0; i < (is_bar ? 1 : 2); i++) {
-    const char *label = PW_PRINTED (160, "body %.60s: %s", body.name, key[1 + i]);
+    const char *label = PW_JOINED (160, "body ", body.name, ": ", key[1 + i]);
     pw_yaml_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
   if (is_bar && build_bar (r, name, v[2], v[3], &body) != PW_OK) return r->error->status;
   for (int i = is_bar; i < 2; i++) {
-    const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
+    const char *label = PW_JOINED (160, key[3 + i], " of body ", body.name);
     const pw_node *given[4];
     pw_yaml_keys (r, v[3 + i], state[i], label, given);
     for (int k = 0; k < 3; k++) {
       if (given[k] == NULL) continue;
       double *value = (i ? body.rate : body.start) + k;
-      pw_yaml_number (r, given[k], PW_PRINTED (200, "%s: %s", label, state[i][k]), PW_REAL, value);
+      pw_yaml_number (r, given[k], PW_JOINED (200, label, ": ", state[i][k]), PW_REAL, value);
       body.specified |= 1u << (3 * i + k);
     }
   }
@@ -279,7 +279,7 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   const pw_field *f = r->field;
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
-  r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
+  r->label = PW_JOINED (200, r->kind->name, " ", element, ": ", f->name);
   if (f->given) *(int *)(void *)(r->definition + f->given) = 1;
   if (count == 1) return build_value (r, node, 0, to);
   const int world = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point of all bodies */
@@ -347,7 +347,7 @@ static int build_fields (pw_reader *r, const pw_node *at, const pw_node *node, c
   memcpy (r->definition, &name, sizeof name);
   for (const pw_field *f = kind->fields; f->name && n < PW_MAX_KEYS - 2; f++) key[n++] = f->name;
   key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
-  pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "%s %s", *kind->name == 'o' ? "an" : "a", kind->name), v);
+  pw_yaml_keys_from (r, first, key, PW_JOINED (100, *kind->name == 'o' ? "an " : "a ", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
@@ -434,7 +434,7 @@ static int head_parameter (const pw_reader *r, const pw_node *node, pw_names *na
   if (pw_yaml_name (r, name, "parameter", &p->name) != PW_OK) return r->error->status;
   if (pw_names_add (names, p->name, 0) >= 0) return read_fail (r, name->at, "a second parameter \"%s\"", p->name);
   p->unit = p->about = "";
-  const char *label = PW_PRINTED (100, "parameter %s", p->name);
+  const char *label = PW_JOINED (100, "parameter ", p->name);
   if (value == NULL) return read_fail (r, node->at, "%s needs a value, its default", label);
   if (min && (!pw_node_is (min, "0") || domain))
     return read_fail (r, min->at, "min: only 0 can be written, without a domain; \"domain: positive\" means > 0");

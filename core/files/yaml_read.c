@@ -92,7 +92,8 @@ static int copies_write_number (pw_copies *c, const pw_node *source, const char 
   const size_t offset = (size_t)(begin - source->text), size = strcspn (begin, "}");
   double value = 0;
   if (begin[size] == 0) return copy_fail (c, source, offset - 1, "there is no \"}\" for this \"{\"");
-  int status = copy_value (c, c->scope, PW_PRINTED (COPY_TEXT + 1, "%.*s", (int)size, begin), &value, &c->fault);
+  int status = copy_value (c, c->scope, pw_print_part ((char[COPY_TEXT + 1]){ 0 }, COPY_TEXT + 1, begin, size), &value,
+                           &c->fault);
   c->faulty = source, c->fault.at += offset;
   if (status != PW_OK) return status;
   value += 0;                                                          /* not -0 */
@@ -296,7 +297,7 @@ static void refuse_unit (const pw_reader *r, const char *text, pw_expression_err
 int pw_yaml_varies (const pw_reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;)
-    if (r->outputs.slot && pw_names_find (&r->outputs, PW_PRINTED (200, "%s%s", r->prefix, name)) >= 0) return 1;
+    if (r->outputs.slot && pw_names_find (&r->outputs, PW_JOINED (200, r->prefix, name)) >= 0) return 1;
   return find_variable (r, text) != NULL;
 }
 
@@ -496,7 +497,7 @@ int pw_body_state (const char *part) {
 int pw_check_state_name (pw_reader *r, const pw_node *node, const char *name, size_t at) {
   size_t n = strcspn (name, ".");
   if (name[n] == 0 && pw_is_state_name (r, name)) return PW_OK;
-  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
+  const char *owner = PW_PART (name, n);
   if (pw_names_find (&r->bodies, owner) < 0) return state_of_element (r, node, owner, name + n + 1, at);
   if (pw_body_state (name + n + 1) >= 0) return PW_OK;
   return expression_fail (r, node, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"",

@@ -106,7 +106,7 @@ static void signal_close (void *context) {
 /* Whether the name of a state is that of a velocity, not of a coordinate or a first-order state. */
 static int signal_is_velocity (const pw_reader *r, const char *name) {
   const char *dot = strchr (name, '.'), *part = dot ? dot + 1 : "";
-  const char *owner = PW_PRINTED (100, "%.*s", dot ? (int)(dot - name) : 0, name);
+  const char *owner = PW_PART (name, dot ? (size_t)(dot - name) : 0);
   if (dot == NULL) return 0;
   if (pw_names_find (&r->bodies, owner) >= 0) return pw_body_state (part) >= 3;
   const int kind = pw_names_find (&r->elements, owner);
@@ -140,8 +140,8 @@ static int find_column (pw_reader *r, const char *name, pw_column *c) {
   const char *dot = strchr (name, '.'), *last = strrchr (name, '.');
   if (dot == NULL && pw_is_state_name (r, name)) return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
   if (dot == NULL) return pw_kind_find_column (NULL, name, c);
-  const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name);
-  const char *body = last == dot ? NULL : PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(last - dot) - 1, dot + 1);
+  const char *owner = PW_PART (name, (size_t)(dot - name));
+  const char *body = last == dot ? NULL : PW_PART (dot + 1, (size_t)(last - dot) - 1);
   if (body == NULL && pw_names_find (&r->bodies, owner) >= 0 && pw_body_state (last + 1) >= 0)
     return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
   int kind = pw_index_elements (r) == PW_OK ? pw_names_find (&r->elements, owner) : -1;
@@ -156,8 +156,7 @@ static int find_column (pw_reader *r, const char *name, pw_column *c) {
  * out of memory. */
 static const char *contact_text (pw_reader *r, const char *name) {
   const char *dot = strchr (name, '.');
-  int elements,
-      found = dot ? pw_names_find (&r->contacts, PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name)) : -1;
+  int elements, found = dot ? pw_names_find (&r->contacts, PW_PART (name, (size_t)(dot - name))) : -1;
   if (found < 0 || (strcmp (dot, ".x") != 0 && strcmp (dot, ".y") != 0)) return NULL;
   const pw_element *e = pw_model_elements (r->model, &elements) + found;
   const double *at = pw_field_at (e->kind, e->definition, PW_POINT, 0);
@@ -178,7 +177,7 @@ static const char *expand_name (void *context, const char *name) {
 static int output_unknown (pw_reader *r, const pw_node *node, const char *name, size_t at) {
   static const char *const other[] = { "x", "y", "work", "loss" };
   const size_t n = strcspn (name, ".");
-  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
+  const char *owner = PW_PART (name, n);
   const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
   const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
   pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
@@ -201,7 +200,7 @@ static int output_unknown (pw_reader *r, const pw_node *node, const char *name, 
 static int signal_add_column (pw_reader *r, const pw_node *node, pw_signal_function *f,
                               const pw_output_function *output, const char *name, size_t at) {
   char state[PW_EXPRESSION_NAME];
-  const char *place = contact_text (r, name), *owner = PW_PRINTED (100, "%.*s", (int)strcspn (name, "."), name);
+  const char *place = contact_text (r, name), *owner = PW_PART (name, strcspn (name, "."));
   const char *where = output ? PW_PRINTED (100, "output \"%s\" reads %s: ", output->output.name, name) : "";
   pw_column c;
   for (const char *rest = place ? place : ""; pw_expression_next_name (&rest, state) != NULL;)

@@ -358,7 +358,7 @@ int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) 
   pw_error none = { 0 };
   for (int k = 0; dot && k < PW_HOLD_OF_BODY; k++) {
     if (strcmp (dot + 1, hold_of_body[k].name) != 0) continue;
-    int b = pw_system_find_body (s, PW_PRINTED (300, "%.*s", (int)(dot - name), name));
+    int b = pw_system_find_body (s, PW_PART (name, (size_t)(dot - name)));
     if (b >= 0) return 2 * s->coords + b * PW_HOLD_OF_BODY + k;
   }
   int state = pw_system_find_state (s, name, &none);

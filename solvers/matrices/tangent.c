@@ -427,19 +427,31 @@ void pw_scatter_record_entry (pw_scatter_map *t, int row, int col) {
   t->count++;
 }
 
-/* By columns, then by rows. */
-static int scatter_compare (const void *a, const void *b) {
-  const struct pw_scatter_entry *x = a, *y = b;
-  return x->col != y->col ? (x->col > y->col) - (x->col < y->col) : (x->row > y->row) - (x->row < y->row);
+/* to = from, sorted by columns or by rows; entries of one column or row keep their order.  
+ * first: n + 1 zeros. */
+static void scatter_sort (const pw_scatter_map *t, const struct pw_scatter_entry *from, struct pw_scatter_entry *to,
+                          int by_columns, size_t *first, int n) {
+#define KEY(e) (by_columns ? (e).col : (e).row)
+  for (size_t i = 0; i < t->count; i++) first[KEY (from[i]) + 1]++;
+  for (int c = 0; c < n; c++) first[c + 1] += first[c];
+  for (size_t i = 0; i < t->count; i++) to[first[KEY (from[i])]++] = from[i];
 }
 
 int pw_scatter_lay_out (pw_scatter_map *t, int n) {
+  struct pw_scatter_entry *by_rows = malloc ((t->count + 1) * sizeof *by_rows);
+  size_t *first = calloc (2 * ((size_t)n + 1), sizeof *first);
   t->place = malloc ((t->count + 1) * sizeof *t->place);
   t->colptr = malloc (((size_t)n + 1) * sizeof *t->colptr);
   t->rowind = malloc ((t->count + 1) * sizeof *t->rowind);
-  if (t->failed || !t->place || !t->colptr || !t->rowind) return PW_RESOURCE;
+  const int failed = t->failed || !by_rows || !first || !t->place || !t->colptr || !t->rowind;
+  if (!failed && t->count > 0) {
+    scatter_sort (t, t->entry, by_rows, 0, first, n);
+    scatter_sort (t, by_rows, t->entry, 1, first + n + 1, n);
+  }
+  free (by_rows);
+  free (first);
+  if (failed) return PW_RESOURCE;
   size_t entry = 0;
-  if (t->count > 0) qsort (t->entry, t->count, sizeof *t->entry, scatter_compare);
   for (int c = 0; c < n; c++) {
     t->colptr[c] = (int64_t)t->nonzeros;
     for (int last_row = -1; entry < t->count && t->entry[entry].col == c; entry++) {
