@@ -87,7 +87,7 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3
 char *pw_print_part (char *buffer, size_t size, const char *text, size_t n);
 /* Joins texts, of which NULL is the last, in the same way; ten times faster, since there is no format. */
 char *pw_join (char *buffer, size_t size, const char *first, ...);
-/* pw_print, pw_print_part, and pw_join without the NULL, into a buffer of its own, which lives as long as the block around it. */
+/* pw_print, pw_print_part, and pw_join without the NULL, into a buffer that lives as long as the block around it. */
 #define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)
 enum { PW_PART_MOST = 200 };
 #define PW_PART(text, n) pw_print_part ((char[PW_PART_MOST]){ 0 }, PW_PART_MOST, text, n)

@@ -26,7 +26,8 @@ static inline void pw_scatter_begin_record (pw_scatter_map *t) {
   *t = (pw_scatter_map){ .recording = 1 };
 }
 
-/* Ends the recording, of a matrix with n columns and at most n rows.  PW_OK or PW_RESOURCE; close the map in both cases. */
+/* Ends the recording, of a matrix with n columns and at most n rows.  PW_OK or PW_RESOURCE; close the map in both
+ * cases. */
 int pw_scatter_lay_out (pw_scatter_map *t, int n);
 void pw_scatter_close (pw_scatter_map *t);
 
