@@ -77,7 +77,7 @@ checks= forbidden=
 try snakeboard snakeboard swing 0.55 10
 checks=yes try 'a model in C' models/vehicles/ezyroller.c a 0.7 10
 forbidden='worker-src blob:;' try 'without Workers' models/vehicles/ezyroller.c a 0.7 10
-try 'sliders whose ends are moved' models/linkages/slider-crank.c l1 1.2 1
+try 'sliders whose ends are moved' slider-crank l1 1.2 1
 try 'redundant constraints' models/linkages/redundant-parallelogram.c l 1.25 3
 try 'contacts with friction' hopper mu 0.5 2
 try 'a wheel that slides' drifting-car u0 11 5
