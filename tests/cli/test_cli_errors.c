@@ -124,7 +124,7 @@ TEST (bad_lines) {
   cli_bad_each ("", bad, sizeof bad / sizeof *bad);
 }
 
-/* A rod that is too short: the error names the expression that has no value.  Perpendicular to the axis, it turns too fast. */
+/* A rod that is too short: the error names the expression without a value.  Perpendicular, it is too fast. */
 TEST (too_short) {
   assert_int_equal (cli_run ("pinwheel run slider-crank --set l1=2 --set theta=1"), 2);
   assert_non_null (strstr (cli_err, "slider-crank.yaml:24:11: error: let beta = "));
