@@ -245,6 +245,15 @@ void pw_outcomes_close (pw_outcomes *set) {
   *set = (pw_outcomes){ .system = NULL };
 }
 
+void pw_outcomes_report (const pw_outcomes *set) {
+  for (const pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+    if (pw_is_integral (f->type) && f->column.type == PW_COLUMN_OUTPUT &&
+        pw_system_output_jumps (set->system, f->column.index))
+      pw_cli_say ("pinwheel: output %s has conditions on reactions, energies or contact points, which are not located: "
+                  "its integral may be wrong by what changes within a step; compare with smaller steps\n",
+                  pw_system_output_name (set->system, f->column.index));
+}
+
 double pw_outcome_value (const pw_outcomes *set, int outcome) {
   const pw_outcome *o = set->outcome + outcome;
   double value[PW_FORMULA_NAMES] = { 0 };

@@ -735,6 +735,7 @@ static int optimise_open_outputs (pw_optimise *problem, int first, int count, co
   pw_outcomes set;
   int status = pw_outcomes_open (&set, problem->line.m.system, option, problem->output + first, count,
                                  problem->line.until, error);
+  if (status == PW_OK) pw_outcomes_report (&set);
   for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
   for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
   pw_outcomes_close (&set);

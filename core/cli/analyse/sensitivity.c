@@ -150,6 +150,7 @@ static int sensitivity_solve (sensitivity *cmd, pw_error *error) {
   for (int p = 0; p < u->count; p++) values[p] = u->list[p].value;
   int status = pw_outcomes_open (&cmd->outcomes, cmd->line.m.system, cmd->outputs.option, cmd->outputs.of,
                                  cmd->outputs.count, cmd->line.until, error);
+  if (status == PW_OK) pw_outcomes_report (&cmd->outcomes);
   if (status == PW_OK) status = pw_run_outputs_at (&cmd->outputs, values, cmd->value, cmd->table, error);
   if (status == PW_OK) status = sensitivity_prepare (cmd, values, error);
   for (int p = 0; p < u->count && status == PW_OK; p++) status = sensitivity_check (cmd, values, p, error);

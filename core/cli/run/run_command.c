@@ -781,6 +781,7 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   if (follows)
     status = pw_outcomes_open (&command->outcomes, system, "--of", command->of, outputs, command->line.until, error);
   if (status != PW_OK) return status;
+  if (follows) pw_outcomes_report (&command->outcomes);
   if (follows) pw_outcomes_settings (&command->outcomes, &command->settings);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;

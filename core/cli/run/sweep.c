@@ -228,6 +228,7 @@ static int plan_open_outputs (pw_plan *plan, const pw_system *system, long row, 
     plan->output[i].unit = pw_arena_copy (&plan->arena, pw_outcome_unit (&set, i, unit, sizeof unit));
     if (plan->output[i].unit == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
   }
+  if (status == PW_OK) pw_outcomes_report (&set);
   plan->by_steps = set.extrema || set.integrals || plan->line->until;
   for (int i = 0; i < set.functionals; i++) plan->by_steps |= set.functional[i].type == PW_AT_TIME;
   pw_outcomes_close (&set);
