@@ -30,6 +30,11 @@ static void sides_evaluate_rates (pw_run *r, double h, double *beyond, double *r
   for (int i = 0; i < r->sides->count; i++) rate[i] = (rate[i] - beyond[i]) / s;
 }
 
+/* Errors of the method in condition i of an output. */
+static double sides_small (const pw_run *r, int i) {
+  return fmax (SIDES_ROUND_OFF, r->fixed_steps ? 0 : r->settings.rtol) * r->sides->size[i];
+}
+
 /* pw_crossing_search.at.  Keeps the earliest sample beyond a side.  It must not be computed again: methods interpolate
  * between samples (rk.c), so that a second one at its time may differ by the tolerance. */
 static int sides_at (void *context, double t, double *value, pw_error *error) {
@@ -42,7 +47,7 @@ static int sides_at (void *context, double t, double *value, pw_error *error) {
   pw_run_evaluate_sides (r, t, r->q_at, r->v_at, value);
   int beyond = 0;
   for (int i = 0; i < x->count; i++) {
-    if (x->start[i] == -INFINITY) value[i] = -INFINITY;
+    if (x->start[i] == -INFINITY && !(value[i] > sides_small (r, i))) value[i] = -INFINITY;
     beyond |= value[i] > 0;
   }
   if (!beyond || !(t < x->found.t)) return PW_OK;
@@ -91,22 +96,24 @@ int pw_sides_begin (pw_run *r, pw_error *error) {
 }
 
 /* 1 if no cubic of the end values and rates comes near 0: `bend` is four times its deviation from the chord or more. */
-static int sides_far (const pw_sides *x, double h) {
+static int sides_far (const pw_run *r, double h) {
+  const pw_sides *x = r->sides;
   for (int i = 0; i < x->count; i++) {
-    const double chord = x->end[i] - x->start[i];
+    const int small = x->start[i] == -INFINITY;
+    const double chord = small ? 0 : x->end[i] - x->start[i], most = fmax (x->start[i], x->end[i]);
     const double bend = fabs (h * x->start_rate[i] - chord) + fabs (h * x->end_rate[i] - chord);
-    if (!(fmax (x->start[i], x->end[i]) + bend < 0) && x->start[i] > -INFINITY) return 0;
+    if (!((small ? -sides_small (r, i) : most) + bend < 0)) return 0;
   }
   return 1;
 }
 
-/* Passes over conditions of outputs that are 0 in the whole step but for errors of the method. */
+/* Passes over conditions of outputs that are 0 at both ends of the step but for errors of the method, unless a sample
+ * between them exceeds these errors. */
 static void sides_skip (pw_run *r) {
   pw_sides *x = r->sides;
   for (int i = x->signals; i < x->count; i++) {
     if (isfinite (x->end[i])) x->size[i] = fmax (x->size[i], fabs (x->end[i]));
-    const double small = fmax (SIDES_ROUND_OFF, r->fixed_steps ? 0 : r->settings.rtol) * x->size[i];
-    if (x->start[i] > -small && x->end[i] < small) x->start[i] = x->end[i] = -INFINITY;
+    if (fmax (fabs (x->start[i]), fabs (x->end[i])) < sides_small (r, i)) x->start[i] = x->end[i] = -INFINITY;
   }
 }
 
@@ -135,7 +142,7 @@ int pw_sides_follow (pw_run *r, double t0, pw_error *error) {
   x->h = r->t - t0;
   sides_evaluate_rates (r, x->h, x->end, x->end_rate);
   sides_skip (r);
-  if (sides_far (x, x->h)) return PW_OK;
+  if (sides_far (r, x->h)) return PW_OK;
   x->found.t = INFINITY;
   const double root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
   if (search.status != PW_OK) return search.status;
@@ -190,7 +197,10 @@ int pw_sides_open (pw_run *r, pw_error *error) {
     return r->sides = NULL, pw_fail_memory (r->s, error);
   sides_list (r, x, state);
   double *q = r->scratch, *v = q + r->s->coords;
-  for (int j = 0; j < r->s->coords; j++) q[j] = r->q[j] + pw_unit (r->s, j), v[j] = pw_velocity_unit (r, j, 0);
+  for (int j = 0; j < r->s->coords; j++) { /* no two changes are equal, so that differences have a size, too */
+    const double part = 2 + cos (j);
+    q[j] = r->q[j] + part * pw_unit (r->s, j), v[j] = part * pw_velocity_unit (r, j, 0);
+  }
   pw_run_evaluate_sides (r, r->t, q, v, NULL);
   pw_run_evaluate_sides (r, r->t, q, v, x->size);
   for (int i = 0; i < count; i++) x->size[i] = isfinite (x->size[i]) ? fabs (x->size[i]) : 0;

@@ -75,3 +75,44 @@ TEST (not_located) {
   cli_shell ("pinwheel sweep @/conditions.yaml --vary a.x=1:2:2 -t 1 --of mean:presses -o @/sweep.csv");
   assert_non_null (strstr (cli_err, "output presses has conditions on reactions"));
 }
+
+/* A ball that bounces lies on the ground at both ends of a step that contains a whole flight. */
+TEST (whole_flight_in_a_step) {
+  cli_write ("flight.yaml",
+             "pinwheel: 1\n"
+             "bodies:\n"
+             "  - {name: b, mass: 1, inertia: 1, start: {y: 0.1}, rate: {vy: 5}}\n"
+             "elements:\n"
+             "  - {gravity: g, acceleration: [0, -10]}\n"
+             "  - {contact: floor, body: [b, ground], at: [[0, 0], [0, 0]], radius: 0.1, restitution: 0.5}\n"
+             "outputs:\n"
+             "  - {name: air, value: 'b.y > 0.1 ? 1 : 0'}\n");
+  static const char *const of[] = { "rk4+projection --step 1e-2", "rk4+none --step 2e-2", "radau+ggl --rtol 1e-10",
+                                    "galpha+index3 --step 1e-2", "erk8+projection --rtol 1e-10" };
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+    cli_good (check_text ("pinwheel run @/flight.yaml -t 3 -m %s --of integral:air", of[i]));
+    check_close (of[i], conditions_printed ("integral:air"), 2, 3e-4, "flights that are not resolved");
+  }
+}
+
+/* A block that sticks to a cart: round-off of the difference of their states changes no side. */
+TEST (states_that_stay_equal) {
+  cli_write ("stuck.yaml",
+             "pinwheel: 1\n"
+             "bodies:\n"
+             "  - {name: cart, mass: 1.3, inertia: 1, rate: {vx: 0.6, vy: 0.8}}\n"
+             "  - {name: block, mass: 0.7, inertia: 1, rate: {vx: 0.6, vy: 0.8}}\n"
+             "elements:\n"
+             "  - {slider: s1, body: [cart, ground], at: [[0, 0], [0, 0]], heading: atan (4.0/3)}\n"
+             "  - {slider: s2, body: [block, ground], at: [[0, 0], [0, 0]], heading: atan (4.0/3)}\n"
+             "  - {force: f, body: cart, fx: sin (t), fy: -0.3*cart.vy}\n"
+             "  - {sliding-friction: s, body: [block, cart], at: [[0, 0], [0, 0]], heading: atan (4.0/3), limit: 5}\n"
+             "outputs:\n"
+             "  - {name: faster, value: 'block.vx > cart.vx ? 1 : 0'}\n"
+             "  - {name: ahead, value: 'block.x > cart.x ? 1 : 0'}\n");
+  cli_good ("pinwheel run @/stuck.yaml -t 10 -m galpha+index3 --step 1e-2 --json @/run.json --of integral:faster --of "
+            "integral:ahead");
+  check_close ("conditions", cli_number (cli_file ("run.json"), "statistics", "conditions", NULL), 0, 0, "exact");
+  check_close ("faster", conditions_printed ("integral:faster"), 0, 0, "exact");
+  check_close ("ahead", conditions_printed ("integral:ahead"), 0, 0, "exact");
+}
