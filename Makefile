@@ -226,9 +226,10 @@ $(BUILD)/models/%.c: %.c
 
 OWN_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
-# LAPACK first, where it is a library of its own: many distributions bind all of its symbols when a program starts, and each is
-# sought in the libraries in this order.
-FIRST_LIBS = $(foreach l,lapack blas,$(if $(filter /%,$(shell $(CC) -print-file-name=lib$l.so)),-l$l))
+# Libraries with many symbols first, where they are libraries of their own: many distributions bind all of them when a program
+# starts, and each is sought in the libraries in this order.
+FIRST_LIBS = $(foreach l,lapack lapacke blas sundials_cvodes sundials_idas,$(if \
+               $(filter /%,$(shell $(CC) -print-file-name=lib$l.so)),-l$l))
 
 $(PROGRAM): $(CLI_OBJ) $(BASE_OBJ) $(LIB) $(FILES_LIB)
 	$(call say,LINK)
