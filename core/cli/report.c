@@ -64,7 +64,9 @@ static void report_initial (pw_run *run, const pw_system *system) {
                                                        initial->moved - changed == 1 ? "s" : "")
                                          : "");
   else
-    pw_cli_say ("pinwheel: %s left out follow%s from the constraints:\n", left, initial->moved == 1 ? "s" : "");
+    pw_cli_say ("pinwheel: %s left out follow%s from the constraints%s\n", left, initial->moved == 1 ? "s" : "",
+                initial->moved > REPORT_MESSAGES ? "" : ":");
+  if (!changed && initial->moved > REPORT_MESSAGES) return;
   for (int specified = 1; specified >= 0; specified--)
     for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
       if (!pw_initial_moved (system, initial, state) || pw_initial_specified (initial, state) != specified) continue;
