@@ -373,9 +373,8 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
 }
 
 void pw_events_forget (pw_run *r) {
-  pw_events *x = r->events;
+  pw_events *x = r->events; /* u that has been away from 0 remains armed: it may be about to return */
   x->pending = x->fell = 0, x->start_t = x->previous_t = NAN;
-  memset (x->armed, 0, (size_t)x->count);
 }
 
 int pw_events_advance (pw_run *r, double t_end, pw_error *error) {

@@ -116,3 +116,25 @@ TEST (states_that_stay_equal) {
   check_close ("faster", conditions_printed ("integral:faster"), 0, 0, "exact");
   check_close ("ahead", conditions_printed ("integral:ahead"), 0, 0, "exact");
 }
+
+/* A block that rocks passes the angle 0 where its other corner hits the ground: that impact adds no energy, and the
+ * block comes to rest as without integrals. */
+TEST (condition_at_an_impact) {
+  double steps[2];
+  cli_write ("block.yaml",
+             "pinwheel: 1\n"
+             "bodies:\n"
+             "  - {name: b, mass: 1, inertia: 3.3333e-6, start: {y: 0.00607, phi: 0.094}}\n"
+             "elements:\n"
+             "  - {gravity: g, acceleration: [0, -9.81]}\n"
+             "  - {contact: l, body: [b, ground], at: [[-0.001, -0.003], [0, 0]], mu: 0.8}\n"
+             "  - {contact: r, body: [b, ground], at: [[0.001, -0.003], [0, 0]], restitution: 0.3, mu: 0.3}\n"
+             "outputs:\n"
+             "  - {name: side, value: sign (b.phi)}\n");
+  for (int i = 0; i < 2; i++) {
+    cli_good (check_text ("pinwheel run @/block.yaml -t 0.38 -m erk8+projection --rtol 1e-8 --json @/run.json%s",
+                          i ? " --of integral:b.phi" : ""));
+    steps[i] = cli_number (cli_file ("run.json"), "statistics", "steps", NULL);
+  }
+  check_below ("steps", steps[1], 2 * steps[0], "of the run without integrals");
+}
