@@ -453,6 +453,7 @@ void pw_run_serialise_sides (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, &x->fixed, sizeof x->fixed);
   pw_archive_bytes (a, &x->h, sizeof x->h);
   pw_archive_bytes (a, x->changed, (size_t)x->count);
+  pw_archive_bytes (a, x->size, (size_t)x->count * sizeof *x->size);
   pw_archive_bytes (a, x->state, 2 * (size_t)r->s->coords * sizeof *x->state);
   pw_archive_bytes (a, &r->interrupted, sizeof r->interrupted);
   if (a->loading && !a->failed && x->fixed) sides_fix (r, x->t, x->state, x->state + r->s->coords);

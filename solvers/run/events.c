@@ -541,6 +541,7 @@ int pw_events_restart (pw_run *r, double *energy, pw_error *error) {
   x->start_t = x->previous_t = NAN, x->roughness = 0, x->origin = NULL;
   x->stepping = x->pending = x->fell = 0;
   memset (x->triggered, 0, (size_t)x->count);
+  memset (x->armed, 0, (size_t)x->count);
   for (int i = 0; i < x->count; i++) x->limit[i].initially_slides = !pw_is_one_sided (&x->limit[i]);
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_initial (r);
@@ -708,6 +709,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->spare, (size_t)x->count);
   pw_archive_bytes (a, x->still, (size_t)x->count);
   pw_archive_bytes (a, x->struck, (size_t)x->count);
+  pw_archive_bytes (a, x->armed, (size_t)x->count);
   pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
   pw_archive_bytes (a, x->direction, (size_t)x->count * sizeof *x->direction);
   pw_archive_bytes (a, x->bias, (size_t)x->count * sizeof *x->bias);
@@ -730,7 +732,6 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
     a->failed |= mode < -1 || mode > 1 || !isfinite (given) || !(x->offset[i] >= 0);
   }
   if (a->failed) r->event_count = 0;
-  memset (x->armed, 0, (size_t)x->count);
   x->start_t = x->previous_t = NAN, x->longest = EVENTS_FIRST * r->w->scale.time, x->roughness = 0;
   if (!a->failed) pw_modes_apply (r);
 }

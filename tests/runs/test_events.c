@@ -694,6 +694,30 @@ TEST (checkpoints) {
     }
 }
 
+/* An impact just after a checkpoint is located as without it: at the distance 0. */
+TEST (checkpoint_before_an_impact) {
+  static const char *const method[] = { "erk8+projection", "radau+ggl" };
+  const double t = sqrt (2 / 9.81);
+  pw_system *s = runs_scene ("ball", "");
+  for (int i = 0; i < 2; i++) {
+    const pw_settings set = { .rtol = 1e-8, .span = 1 };
+    pw_run *saved = runs_open (s, method[i], &set);
+    check_ok (pw_run_advance_to (saved, t - 1e-9, t - 1e-9, NULL), NULL);
+    pw_run *loaded = runs_copy (saved, s, method[i], &set);
+    for (int k = 0; k < 2; k++) {
+      int count;
+      pw_run *r = k ? loaded : saved;
+      (void)runs_to (r, 0.6);
+      const pw_event *event = pw_run_events (r, &count);
+      assert_int_equal (count, 1);
+      check_close (method[i], event[0].t, t, 1e-11, "of a parabola");
+    }
+    pw_run_close (loaded);
+    pw_run_close (saved);
+  }
+  pw_system_free (s);
+}
+
 /* ---- Limits that are not reached; samples in a step with an event ---- */
 
 TEST (not_reached) {
