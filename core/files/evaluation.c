@@ -338,7 +338,7 @@ static int side_fix_code (pw_expression_code *code, int n, int op, double side, 
   return first + n - second;
 }
 
-int pw_expression_sides (const pw_expression *x, const double *variable, double *side, double *beyond,
+int pw_expression_sides (const pw_expression *x, int of_time, const double *variable, double *side, double *beyond,
                          pw_expression *fixed) {
   side_number stack[PW_EXPRESSION_STACK], *top = stack;
   int conditions = 0, n = 0;
@@ -352,7 +352,7 @@ int pw_expression_sides (const pw_expression *x, const double *variable, double 
     if (operands == 0) {
       result.value = c->op == PW_OP_CONSTANT ? c->value : variable[c->index];
       result.size = fabs (result.value);
-      result.of_states = c->op == PW_OP_VARIABLE && c->index != PW_EXPRESSION_TIME;
+      result.of_states = c->op == PW_OP_VARIABLE && (of_time || c->index != PW_EXPRESSION_TIME);
       if (code) code[n++] = *c;
     } else if (conditional && result.of_states) {
       double *s = &side[conditions];

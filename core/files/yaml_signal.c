@@ -54,7 +54,7 @@ static int signal_sides (void *context, double t, const double *state, double *b
   pw_signal_function *f = context;
   double variable[PW_OUTPUT_READS + 1] = { t };
   if (state) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
-  if (state) pw_expression_sides (f->whole, variable, f->side, beyond, beyond ? NULL : f->fixed);
+  if (state) pw_expression_sides (f->whole, f->is_output, variable, f->side, beyond, beyond ? NULL : f->fixed);
   if (!beyond) f->expression[0] = state ? f->fixed : f->whole;
   return f->conditions;
 }
@@ -322,7 +322,8 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal
 /* The conditions of a function that has been read. */
 static void signal_find_sides (pw_signal_function *f, pw_function *function) {
   double variable[PW_OUTPUT_READS + 1] = { 0 }, side[PW_EXPRESSION_CODES];
-  if (f->states) f->conditions = pw_expression_sides (f->expression[0], variable, side, NULL, NULL);
+  if (f->states || f->is_output)
+    f->conditions = pw_expression_sides (f->expression[0], f->is_output, variable, side, NULL, NULL);
   if (f->conditions) function->sides = signal_sides;
 }
 
@@ -822,6 +823,7 @@ static int output_expression (pw_reader *r, int index, int reads) {
   r->label = PW_PRINTED (100, "output %s", o->output.name);
   pw_signal_function *f = &o->function;
   if (pw_yaml_expression (r, &o->node, f->name, &f->text.part[0], &f->expression[0]) != PW_OK) return r->error->status;
+  f->is_output = 1;
   signal_find_sides (f, &o->output.value);
   return PW_OK;
 }

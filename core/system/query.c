@@ -292,7 +292,7 @@ unsigned pw_system_output_reads (const pw_system *s, int output) {
 
 int pw_system_output_jumps (const pw_system *s, int output) {
   const pw_compiled_output *o = &s->output[output];
-  return o->function.sides != NULL && o->types != 1u << PW_COLUMN_STATE;
+  return o->function.sides != NULL && o->types & ~(1u << PW_COLUMN_STATE);
 }
 
 int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c) {

@@ -172,7 +172,7 @@ static void sides_list (pw_run *r, pw_sides *x, int *state) {
     if (pw_source_has_conditions (of)) sides_add (x, &of->signal.function, of->reads, of->state);
   x->signals = x->count;
   for (; r->settings.integrals > 0 && o < r->w->output + r->s->outputs; o++) {
-    if (!o->function.sides || o->types != 1u << PW_COLUMN_STATE) continue;
+    if (!o->function.sides || o->types & ~(1u << PW_COLUMN_STATE)) continue;
     for (int k = 0; state && k < o->reads; k++) state[k] = o->read[k].index;
     sides_add (x, &o->function, o->reads, state);
     if (state) state += o->reads;

@@ -21,7 +21,8 @@ static const char model[] =
     "  - {name: cut, value: 'max (a.x, 0.3)'}\n"
     "  - {name: both, value: 'beyond + cut'}\n"
     "  - {name: path, value: 'abs (b.vx)'}\n"
-    "  - {name: slides, value: 'b.vx > 1e-6 ? 1 : 0'}\n";
+    "  - {name: slides, value: 'b.vx > 1e-6 ? 1 : 0'}\n"
+    "  - {name: late, value: '(t > 10.0/3 ? t : floor (t))/100'}\n";
 
 const check_fixture fixture = { cli_setup_undrawn, cli_teardown };
 
@@ -47,17 +48,20 @@ TEST (closed_forms) {
              { "adams+none", 0, 1e-5, 350, "hundreds of steps" },
              { "galpha+ggl", 1, 2e-4, 1020, "h^2" } };
   const double t = acos (0.3), beyond = 3 * t, cut = 3 + 3 * (sin (t) - 0.3 * t); /* x is beyond 0.3 for 3 t */
-  const double expected[] = { beyond, 2 * beyond - 10, cut, beyond + cut, 0.3, 1 - 1e-6 / 0.6 };
-  static const char *const text[] = { "integral:beyond", "integral:side", "integral:cut",
-                                      "integral:both",   "integral:path", "integral:slides" };
+  const double expected[] = {
+    beyond, 2 * beyond - 10, cut, beyond + cut, 0.3, 1 - 1e-6 / 0.6, (4 + 50 * (1 - 1. / 9)) / 100
+  };
+  static const char *const text[] = { "integral:beyond", "integral:side",   "integral:cut", "integral:both",
+                                      "integral:path",   "integral:slides", "integral:late" };
   cli_write ("conditions.yaml", model);
   for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
     cli_good (check_text ("pinwheel run @/conditions.yaml -t 10 -m %s --%s --json @/run.json --of integral:beyond --of "
-                          "integral:side --of integral:cut --of integral:both --of integral:path --of integral:slides",
+                          "integral:side --of integral:cut --of integral:both --of integral:path --of integral:slides "
+                          "--of integral:late",
                           of[i].method, of[i].fixed ? "step 1e-2" : "rtol 1e-8"));
     const double steps = cli_number (cli_file ("run.json"), "statistics", "steps", NULL) +
                          cli_number (cli_file ("run.json"), "statistics", "rejected", NULL);
-    for (int k = 0; k < 6; k++)
+    for (int k = 0; k < 7; k++)
       check_close (check_text ("%s, %s", of[i].method, text[k]), conditions_printed (text[k]), expected[k], of[i].bound,
                    of[i].reason);
     check_below (of[i].method, steps, of[i].steps, "of smooth integrands");
