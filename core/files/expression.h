@@ -93,10 +93,10 @@ void pw_expression_derivatives (const pw_expression *expression, const double *v
  * (range.c): a time after t up to which there are no others.  Not found are jumps whose times depend on other
  * variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
-/* The number of conditions on states, and with of_time 1 on time (evaluation.c); `side`: the side of each one, of which there are at most `codes`.
- * beyond NULL: stores the sides at these variables and, unless `fixed` is NULL, makes `fixed`, with room for codes + 2
- * conditions operations, the expression with these sides: paths remain those of x.  Otherwise stores how far each
- * condition is beyond its side, where it matters. */
+/* The number of conditions on states, and with of_time 1 on time (evaluation.c); `side`: the side of each one, of which
+ * there are at most `codes`.  beyond NULL: stores the sides at these variables and, unless `fixed` is NULL, makes
+ * `fixed`, with room for codes + 2 conditions operations, the expression with these sides: paths remain those of x.
+ * Otherwise stores how far each condition is beyond its side, where it matters. */
 int pw_expression_sides (const pw_expression *x, int of_time, const double *variable, double *side, double *beyond,
                          pw_expression *fixed);
 /* Bounds of the value for all values of the variables between lo and hi, infinite if they are unknown. */
