@@ -20,8 +20,10 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
                        .contradictory_row = -1 };
-  p->position = pw_saddle_open (r->w, weight_q ? weight_q : s->mass, s->holonomic, r->active, weight_q ? error : NULL);
-  if (p->position == NULL && !weight_q) p->position = r->saddle; /* all equations determine massless coordinates */
+  pw_error cause = { 0 };
+  p->position = pw_saddle_open (r->w, weight_q ? weight_q : s->mass, s->holonomic, r->active, &cause);
+  if (p->position == NULL && !weight_q && cause.status != PW_RESOURCE) p->position = r->saddle;
+  if (p->position == NULL) pw_fail (error, cause.status, "%s", cause.text);
   p->owns_position = p->position != r->saddle;
   if (p->owns_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;
