@@ -21,7 +21,7 @@ typedef struct {
 
 typedef struct {
   char scene[40], sets[80], crossing[30], after[EVENTS_MOST][10]; /* after: sign or element, or "" */
-  double t_end, last, growth, time[EVENTS_MOST];                  /* last: NaN if not given */
+  double t_end, last, time[EVENTS_MOST];                          /* last: NaN if not given */
   int events, numbers, crossings;
   events_number number[EVENTS_NUMBERS];
 } events_problem;
@@ -63,7 +63,6 @@ static void events_read_line (events_problem *p, char *line, int *read) {
     return;
   }
   if (strcmp (where, "last") == 0) p->last = at, ++*read;
-  if (strcmp (where, "growth") == 0) p->growth = at;
   if (name) {
     const double t = at;
     snprintf (p->crossing, sizeof p->crossing, "%s", name);
@@ -84,7 +83,7 @@ static int events_read (void) {
       for (set = 0; strcmp (events_set[set].name, name) != 0; set++) assert_in_range (set, 0, EVENTS_SETS - 1);
     else if (strncmp (line, "problem", 7) == 0) {
       events_problem *p = &events_problems[events_count++];
-      p->last = NAN, p->growth = 1;
+      p->last = NAN;
       set = EVENTS_SETS;
       assert_true (sscanf (line, "problem %39s %lf %79[^\n]", p->scene, &p->t_end, p->sets) >= 2);
     } else
@@ -259,7 +258,7 @@ static int events_rubs (const events_problem *p) {
 static double events_run (const events_problem *p, const char *method, const pw_settings *settings, double bound,
                           const char *reason) {
   pw_error error = { 0 };
-  events_check c = { .p = p, .method = method, .reason = reason, .bound = bound * p->growth };
+  events_check c = { .p = p, .method = method, .reason = reason, .bound = bound };
   c.s = runs_scene (p->scene, p->sets), c.w = pw_workspace_new (c.s, &error);
   events_columns (&c);
   pw_settings set = *settings;
@@ -276,9 +275,7 @@ static double events_run (const events_problem *p, const char *method, const pw_
   }
   events_advance (&c, p->t_end);
   const char *what = check_text ("%s, %s %s", method, p->scene, p->sets);
-  const double least =
-      strstr (method, "index3") ? 2e-10 : 1e-13; /* distances that are resolved, 2e-13 T/h in index 3 */
-  const double rest = (events_rubs (p) ? 100 : 10) * sqrt (fmax (10 * set.rtol, least));
+  const double rest = (events_rubs (p) ? 100 : 10) * sqrt (fmax (10 * set.rtol, 1e-13)); /* of distances */
   int count;
   const pw_event *event = pw_run_events (c.r, &count);
   if (!isnan (p->last)) {

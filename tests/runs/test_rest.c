@@ -18,7 +18,8 @@ TEST (turn_back_together) {
       if (count != 4) print_error ("%s, rtol %g: %d events\n", method[i], rtol, count);
       assert_int_equal (count, 4);
       for (int k = 0; k < count; k++) {
-        check_close (method[i], event[k].t, (k < 2 ? 0.5 : 1.5) * PW_PI, 0.05 * pow (rtol, 2. / 3), "that of radau");
+        check_close (method[i], event[k].t, (k < 2 ? 0.5 : 1.5) * PW_PI, 0.05 * pow (rtol, 2. / 3),
+                     "of radau, the largest");
         assert_int_equal (event[k].to, -event[k].from);
       }
       runs_close (r, s);
