@@ -316,7 +316,8 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
                           ? "only the value of a signal may depend on the time t or on states"
                           : error.text);
   const char *expected = pw_domain_check (domain, *value);
-  return *expected ? read_fail (r, node->at, "%s = %g: expected %s", label, *value, expected) : PW_OK;
+  if (*expected == 0) return PW_OK;
+  return read_fail (r, node->at, "%s = %g: expected %s", label, isnan (*value) ? (double)NAN : *value, expected);
 }
 
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *label, const char *items, double *value) {

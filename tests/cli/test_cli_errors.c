@@ -127,8 +127,7 @@ TEST (bad_lines) {
 /* A rod that is too short: the error names the expression without a value.  Perpendicular, it is too fast. */
 TEST (too_short) {
   assert_int_equal (cli_run ("pinwheel run slider-crank --set l1=2 --set theta=1"), 2);
-  assert_non_null (strstr (cli_err, "slider-crank.yaml:24:11: error: let beta = "));
-  assert_non_null (strstr (cli_err, "nan: expected a finite number\n"));
+  assert_non_null (strstr (cli_err, "slider-crank.yaml:24:11: error: let beta = nan: expected a finite number\n"));
   assert_int_equal (cli_run ("pinwheel run slider-crank --set l1=2 --set theta=0.5235987755982988"), 4);
   assert_non_null (strstr (cli_err, "t = 0.001 s: the step of 0.001 s is too large: "));
 }
