@@ -55,6 +55,7 @@ static void report_initial (pw_run *run, const pw_system *system) {
   for (int state = 0; state < 2 * n; state++)
     changed += pw_initial_moved (system, initial, state) && pw_initial_specified (initial, state);
   const char *left = PW_COUNTED (initial->moved - changed, "initial value");
+  const int counted = changed == 0 && initial->moved > REPORT_MESSAGES; /* and not listed */
   if (initial->rounded)
     snprintf (rounded, sizeof rounded, " (%d by less than 1e-2 of its unit, as if rounded)", initial->rounded);
   if (changed)
@@ -65,8 +66,8 @@ static void report_initial (pw_run *run, const pw_system *system) {
                                          : "");
   else
     pw_cli_say ("pinwheel: %s left out follow%s from the constraints%s\n", left, initial->moved == 1 ? "s" : "",
-                initial->moved > REPORT_MESSAGES ? "" : ":");
-  if (!changed && initial->moved > REPORT_MESSAGES) return;
+                counted ? "" : ":");
+  if (counted) return;
   for (int specified = 1; specified >= 0; specified--)
     for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
       if (!pw_initial_moved (system, initial, state) || pw_initial_specified (initial, state) != specified) continue;
