@@ -79,7 +79,7 @@ int pw_system_outputs (const pw_system *s);
 const char *pw_system_output_name (const pw_system *s, int output);
 const char *pw_system_output_unit (const pw_system *s, int output);
 unsigned pw_system_output_reads (const pw_system *s, int output);
-/* 1 if it has conditions that no run locates, since it reads more than states: reactions, energies, contact points. */
+/* 1 if it has conditions that no run locates, since it reads reactions, energies or contact points. */
 int pw_system_output_jumps (const pw_system *s, int output);
 
 /* Stores the values of columns in a sample.  NaN: works and losses of elements without pw_settings.ledger, outputs that

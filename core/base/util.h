@@ -89,7 +89,7 @@ char *pw_print_part (char *buffer, size_t size, const char *text, size_t n);
 char *pw_join (char *buffer, size_t size, const char *first, ...);
 /* pw_print, pw_print_part, and pw_join without the NULL, into a buffer that lives as long as the block around it. */
 #define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)
-enum { PW_PART_MOST = 200 };
+enum { PW_PART_MOST = 200 }; /* bytes, with the terminating zero */
 #define PW_PART(text, n) pw_print_part ((char[PW_PART_MOST]){ 0 }, PW_PART_MOST, text, n)
 #define PW_JOINED(size, ...) pw_join ((char[size]){ 0 }, size, __VA_ARGS__, NULL)
 /* The result of pw_system_state_name, or a function like it, in such a buffer. */

@@ -93,7 +93,7 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
                       const char *until, pw_error *error);
 void pw_outcomes_close (pw_outcomes *set);
 
-/* Says which integrands jump within steps, where their conditions are not located. */
+/* Names the integrands that may jump within steps, since their conditions are not located. */
 void pw_outcomes_report (const pw_outcomes *set);
 
 /* Values of outputs along a run, all of whose terms are final values. */

@@ -314,8 +314,8 @@ static double side_beyond (int op, double side, double a, double b) {
 
 /* A value on the stack. */
 typedef struct {
-  double value, size; /* size: of numbers of which it is the sum, for round-off */
-  int of_states;
+  double value, size;   /* size: of numbers of which it is the sum, for round-off */
+  int of_states;        /* 1: it depends on states, or on time where that counts */
   int first, condition; /* its first operation among those with fixed sides; its first condition */
 } side_number;
 

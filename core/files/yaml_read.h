@@ -27,9 +27,9 @@ typedef struct {
   int states;                         /* number of states in it */
   pw_jumps jumps;
   const char *jump; /* an operation that jumps, as pw_expression.jump */
+  int is_output;    /* 1: conditions on time count, too, since steps end at the breakpoints of signals only */
   /* conditions on states: their number and, in the context of a workspace, the expression with and without them, and
    * their sides; expression[0] is one of the two */
-  int is_output; /* 1: its conditions are those on time, too: steps end at breakpoints of signals only */
   int conditions;
   const pw_expression *whole;
   pw_expression *fixed;

@@ -427,14 +427,13 @@ void pw_scatter_record_entry (pw_scatter_map *t, int row, int col) {
   t->count++;
 }
 
-/* to = from, sorted by columns or by rows; entries of one column or row keep their order.  
- * first: n + 1 zeros. */
+/* Copies the entries from one array to another, sorted by columns or by rows; those of one column or row keep their
+ * order.  first: n + 1 zeros, overwritten. */
 static void scatter_sort (const pw_scatter_map *t, const struct pw_scatter_entry *from, struct pw_scatter_entry *to,
                           int by_columns, size_t *first, int n) {
-#define KEY(e) (by_columns ? (e).col : (e).row)
-  for (size_t i = 0; i < t->count; i++) first[KEY (from[i]) + 1]++;
+  for (size_t i = 0; i < t->count; i++) first[(by_columns ? from[i].col : from[i].row) + 1]++;
   for (int c = 0; c < n; c++) first[c + 1] += first[c];
-  for (size_t i = 0; i < t->count; i++) to[first[KEY (from[i])]++] = from[i];
+  for (size_t i = 0; i < t->count; i++) to[first[by_columns ? from[i].col : from[i].row]++] = from[i];
 }
 
 int pw_scatter_lay_out (pw_scatter_map *t, int n) {

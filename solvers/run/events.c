@@ -58,8 +58,8 @@ static int events_allocate (pw_run *r) {
 
 /* ---- Event functions, positive beyond an event: two for each equation ---- */
 
-/* Below this u [units] of equation i is 0 after its root: the error of the method, in index 3 that of velocities by the
- * round-off of positions over a step. */
+/* Below this u [units] of equation i counts as 0 after its root: the error of the method; of velocities in index 3 at
+ * least the round-off of positions over a step. */
 static double events_tolerance (const pw_run *r, int i) {
   const double T = r->w->scale.time, h = r->fixed_steps ? r->settings.step : EVENTS_FIRST * T;
   const int rounded = pw_stabilised_by (r, PW_INDEX3) && r->events->row[i] >= r->s->holonomic;
@@ -88,8 +88,8 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
     if (pw_mode_depends (x, i))
       value[2 * i + (limit->circle == 1)] = fabs (x->u[i]) / x->unit[i] - EVENTS_PARTED - tolerance / 10;
     if (x->mode[i] == 0 || limit->circle == 2 || pw_mode_apart (x, i) || (x->still[i] && !limit->circle)) continue;
-    const double armed = x->row[i] < r->s->holonomic ? 0 : EVENTS_ROUND_OFF; /* bodies that sink in gain energy */
-    value[2 * i] = -u / x->unit[i] - (x->armed[i] ? armed : tolerance + x->offset[i]);
+    const double least = x->row[i] < r->s->holonomic ? 0 : EVENTS_ROUND_OFF; /* a penetration would add energy */
+    value[2 * i] = -u / x->unit[i] - (x->armed[i] ? least : tolerance + x->offset[i]);
     value[2 * i + 1] = -1;
     if (x->still[i] && x->armed[i]) /* of a circle whose first u others keep at 0: u passes beside 0 */
       value[2 * i + 1] = PW_MODES_SMALL / 2 - hypot (x->u[i], x->u[i + 1]) / x->unit[i];

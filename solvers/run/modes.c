@@ -370,14 +370,14 @@ static int modes_open (const pw_run *r, int i, double g) {
  * equations has had an impact since the last motion that was resolved, or all of several are slow, they all hold: it is
  * the end of an accumulation, also of a block that rocks. */
 static int impact_try (pw_events *x, double part, int *count, double *loss) {
-  int ends = 0, fast = 0, several = -1;
+  int ends = 0, fast = 0, impacts = 0;
   for (int k = 0; k < x->d.n; k++) {
     const int i = x->d.list[k];
     if (x->d.normal[k] >= 0) continue;
-    ends |= x->fell && x->struck[i], several++;
+    ends |= x->fell && x->struck[i], impacts++;
     fast |= fabs (x->u_before[i]) >= PW_MODES_SLOW * x->unit[i];
   }
-  ends |= several > 0 && !fast;
+  ends |= impacts > 1 && !fast;
   for (int k = 0; k < x->d.n; k++) {
     const int i = x->d.list[k], slow = ends || fabs (x->u_before[i]) < PW_MODES_SLOW * x->unit[i];
     x->d.b[k] = x->u_before[i] * (1 + (x->mode[i] && !slow && x->d.normal[k] < 0 ? part * x->limit[i].restitution : 0));

@@ -16,7 +16,7 @@
 
 #define SIDES_SLIDE 1e-9      /* [T] a condition that would return to its root within this time slides along it */
 #define SIDES_DIFFERENCE 1e-6 /* of the step, for rates of switching functions by forward differences */
-#define SIDES_ROUND_OFF 1e-10 /* of conditions of outputs, in their size: the velocity of what sticks has no side */
+#define SIDES_ROUND_OFF 1e-10 /* of the size of a condition of an output, below which it keeps its side */
 
 /* ---- Values ---- */
 
@@ -163,8 +163,8 @@ static void sides_add (pw_sides *x, const pw_function *function, int reads, cons
   x->count += function->sides (function->context, 0, NULL, NULL);
 }
 
-/* Lists the functions that have conditions: signals; with integrals, outputs that are functions of states alone, whose
- * indices are stored in `state` unless it is NULL. */
+/* Lists the functions that have conditions: signals; with integrals, outputs that are functions of states and time.
+ * Stores the indices of their states in `state` unless it is NULL. */
 static void sides_list (pw_run *r, pw_sides *x, int *state) {
   const pw_compiled_output *o = r->w->output;
   x->functions = x->count = 0;
@@ -197,7 +197,7 @@ int pw_sides_open (pw_run *r, pw_error *error) {
     return r->sides = NULL, pw_fail_memory (r->s, error);
   sides_list (r, x, state);
   double *q = r->scratch, *v = q + r->s->coords;
-  for (int j = 0; j < r->s->coords; j++) { /* no two changes are equal, so that differences have a size, too */
+  for (int j = 0; j < r->s->coords; j++) { /* by different changes, so that differences of states have a size, too */
     const double part = 2 + cos (j);
     q[j] = r->q[j] + part * pw_unit (r->s, j), v[j] = part * pw_velocity_unit (r, j, 0);
   }
